@@ -1,0 +1,31 @@
+//! Bounds of rounding errors.
+
+use glam::Vec3;
+
+/// Half the distance from 1 to the next `f32`: the relative error of one correctly rounded operation.
+const MACHINE_EPSILON: f32 = f32::EPSILON * 0.5;
+
+/// Relative error bound of `n` successive rounded operations, γₙ = nε/(1 − nε).
+///
+/// Source: \[Higham02\] section 3.1.
+pub const fn gamma(n: u32) -> f32 {
+    n as f32 * MACHINE_EPSILON / (1.0 - n as f32 * MACHINE_EPSILON)
+}
+
+/// A point that was computed with rounding, and the bound of its absolute error per axis.
+///
+/// **Space**: whichever the producer says; world space in an interaction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointWithError {
+    /// The rounded point.
+    pub p: Vec3,
+    /// The true point lies within `p ± error`, axis by axis.
+    pub error: Vec3,
+}
+
+impl PointWithError {
+    /// A point that is exact by definition, such as a camera or a point light.
+    pub fn exact(p: Vec3) -> Self {
+        Self { p, error: Vec3::ZERO }
+    }
+}

@@ -1,0 +1,14 @@
+//! Vectors, frames, rays with error bounds, and the warps that turn uniform numbers into directions.
+
+pub mod frame;
+pub mod interval;
+pub mod ray;
+pub mod rgb;
+pub mod transform;
+pub mod warp;
+
+pub use frame::{Frame, LocalDir};
+pub use interval::{PointWithError, gamma};
+pub use ray::{Ray, spawn_ray, spawn_segment};
+pub use rgb::{Rgb, luminance};
+pub use transform::Transform;

@@ -1,0 +1,9 @@
+//! What a scene file says: plain data, before anything is built from it.
+
+pub mod description;
+pub mod diagnostic;
+pub mod pbrt;
+pub mod ply;
+
+pub use description::Scene;
+pub use diagnostic::{Diagnostic, Severity, SourceMap, Span};
