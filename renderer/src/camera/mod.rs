@@ -44,7 +44,7 @@ pub struct CameraRay {
 #[derive(Clone, Debug)]
 pub struct Camera {
     world_from_camera: Affine3A,
-    camera_from_world: Mat4,
+    resolution: [u32; 2],
     projection: Projection,
 }
 
@@ -95,7 +95,7 @@ impl Camera {
         let matrix = camera.world_from_camera.matrix();
         Ok(Self {
             world_from_camera: Affine3A::from_mat4(matrix.as_mat4()),
-            camera_from_world: matrix.inverse().as_mat4(),
+            resolution,
             projection: projection(camera, resolution, determinant(matrix).abs()),
         })
     }
@@ -140,9 +140,26 @@ impl Camera {
         })
     }
 
-    /// Camera space from world space.
-    pub fn camera_from_world(&self) -> Mat4 {
-        self.camera_from_world
+    /// The frame as the unit square, y down, from world space, for metadata: w is the depth along the camera's axis if
+    /// the camera is in perspective, z / w grows from 0 at a distance of 0.01 to 1 at infinity (orthographic: z is the
+    /// depth). The centre of the lens stands for all of it. `None`: no matrix does what this camera does.
+    pub fn ndc_from_world(&self) -> Option<DMat4> {
+        let (plane, perspective) = match &self.projection {
+            Projection::Perspective { plane, .. } => (plane, true),
+            Projection::Orthographic { plane, .. } => (plane, false),
+            Projection::LatitudeLongitude { .. } | Projection::EqualArea { .. } => return None,
+        };
+        let size = glam::DVec2::new(f64::from(self.resolution[0]), f64::from(self.resolution[1]));
+        let scale = 1.0 / (plane.scale.as_dvec2() * size);
+        let offset = -plane.origin.as_dvec2() * scale;
+        let (x, y) = (DVec4::X * scale.x, DVec4::Y * scale.y);
+        let ndc_from_camera = if perspective {
+            DMat4::from_cols(x, y, offset.extend(1.0).extend(1.0), DVec4::new(0.0, 0.0, -0.01, 0.0))
+        } else {
+            DMat4::from_cols(x, y, DVec4::Z, offset.extend(0.0).extend(1.0))
+        };
+        let world_from_camera = glam::DAffine3::from_mat4(Mat4::from(self.world_from_camera).as_dmat4());
+        Some(ndc_from_camera * DMat4::from(world_from_camera.inverse()))
     }
 
     /// The ray from (`start`, 0) along (`slope`, 1), both in camera space.
