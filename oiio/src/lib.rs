@@ -1,1 +1,40 @@
-//! Skeleton.
+//! Images through OpenImageIO, behind an own C++ shim of some twenty functions: no published binding builds against
+//! the 2.5 of Debian 13.
+//!
+//! [`read`] and [`Reader`] take any format; [`write`] makes OpenEXR with metadata, and PNG; [`TextureSystem`] is
+//! OpenImageIO's cached, filtered look-up.
+//!
+//! # Invariants
+//! No C++ exception and no Rust panic crosses the border; only plain data does. Nothing is linearised: values are those
+//! of the file. The same picture gives the same file, byte for byte, whatever the time and the threads.
+
+mod error;
+mod ffi;
+mod image;
+mod read;
+mod texture;
+mod write;
+
+pub use error::Error;
+pub use image::{Attribute, Format, Image, Window};
+pub use read::{Reader, read};
+pub use texture::{Filter, Lookup, MipMode, Sampler, Stats, Texture, TextureOptions, TextureSystem, Wrap};
+pub use write::{Channel, Compression, FileFormat, Output, Written, write};
+
+/// Threads that OpenImageIO and OpenEXR use inside one call, from now on and in the whole process.
+///
+/// 1 means the calling thread alone: right while a renderer's own threads are at work.
+///
+/// # Errors
+/// OpenImageIO refuses the number.
+pub fn set_threads(threads: usize) -> Result<(), Error> {
+    let threads = i32::try_from(threads.max(1)).map_err(|_| Error::Library(format!("{threads} threads")))?;
+    // SAFETY: `error` is valid for the write.
+    ffi::check(|error| unsafe { ffi::shim_set_threads(threads, error) }).map_err(Error::Library)
+}
+
+/// Version of the OpenImageIO that the shim was compiled against.
+pub fn version() -> String {
+    // SAFETY: a string constant of the shim.
+    unsafe { ffi::copy_text(ffi::shim_version()) }
+}
