@@ -93,8 +93,9 @@ impl Image {
         self.channels.iter().position(|channel| channel == name)
     }
 
-    /// The value of the attribute of that name.
+    /// The value of the attribute of that name. Case does not matter: OpenImageIO writes `worldtocamera` and OpenEXR
+    /// calls it `worldToCamera`.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
-        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value)
+        self.attributes.iter().find(|(key, _)| key.eq_ignore_ascii_case(name)).map(|(_, value)| value)
     }
 }
