@@ -1,0 +1,274 @@
+//! Triangles as emitters: sampled by solid angle where that pays, by area elsewhere.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::{ShapeHit, ShapeSample, finite_solid_angle_pdf, in_range, rounded, solid_angle_pdf, usable};
+use crate::math::{gamma, warp};
+
+/// A triangle that emits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triangle {
+    p: [Vec3; 3],
+    uv: [Vec2; 3],
+    /// Unit, oriented.
+    n: Vec3,
+    /// Cosines between `n` and the vertex normals: the emitting side follows the interpolated vertex normal.
+    facing: [f32; 3],
+    area: f32,
+    /// Angle by which the plane that a ray is tested against may be tilted from the exact one, about vertex 0.
+    tilt: f32,
+}
+
+/// Solid angles (sr) between which the spherical triangle is sampled. Below, the density over area varies so little that
+/// area sampling does as well and is cheaper; near a hemisphere (2π) its three great circles coincide and the angles
+/// between them lose all precision, and sampling the BSDF is the better strategy anyway.
+///
+/// **Source**: \[Pharr23\] section 6.5.4.
+const SOLID_ANGLES: std::ops::RangeInclusive<f64> = 2e-4..=6.22;
+
+/// The texture coordinates of a triangle whose mesh has none.
+pub const DEFAULT_UV: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
+
+impl Triangle {
+    /// The triangle `p`, counter-clockwise seen from the side of its normal, or from the other side when `flipped`.
+    /// Vertex normals, where there are any, decide the side instead; `flipped` is then already in them.
+    ///
+    /// `None`: no area, or not finite.
+    pub fn new(p: [Vec3; 3], uv: Option<[Vec2; 3]>, normals: Option<[Vec3; 3]>, flipped: bool) -> Option<Self> {
+        let [p0, p1, p2] = p.map(Vec3::as_dvec3);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let cross = e1.cross(e2);
+        let doubled_area = cross.length();
+        let area = (0.5 * doubled_area) as f32;
+        if !(area > 0.0 && area.is_finite()) {
+            return None;
+        }
+        // f32 forms the edges, multiplies and subtracts: each component of the normal errs by γ₄ of its two products.
+        let (a, b) = (e1.abs(), e2.abs());
+        let products = DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
+        let n = (cross / doubled_area).as_vec3();
+        let (n, facing) = match normals {
+            Some(normals) => (n, normals.map(|normal| normal.dot(n))),
+            None => (if flipped { -n } else { n }, [1.0; 3]),
+        };
+        let tilt = gamma(4) * (products.length() / doubled_area) as f32;
+        Some(Self { p, uv: uv.unwrap_or(DEFAULT_UV), n, facing, area, tilt })
+    }
+
+    /// Surface area.
+    pub fn area(&self) -> f32 {
+        self.area
+    }
+
+    /// See [`super::Shape::bounds`].
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let [p0, p1, p2] = self.p;
+        (p0.min(p1).min(p2), p0.max(p1).max(p2))
+    }
+
+    /// See [`super::Shape::normal_cone`].
+    pub fn normal_cone(&self) -> (Vec3, f32) {
+        let [f0, f1, f2] = self.facing;
+        if f0.min(f1).min(f2) >= 0.0 {
+            (self.n, 1.0)
+        } else if f0.max(f1).max(f2) < 0.0 {
+            (-self.n, 1.0)
+        } else {
+            // The vertex normals disagree about the side, so parts of the triangle face either way.
+            (self.n, -1.0)
+        }
+    }
+
+    /// Nearest hit; u, v are the barycentric coordinates of vertices 1 and 2.
+    pub fn intersect(&self, origin: Vec3, direction: Vec3, t_range: (f32, f32)) -> Option<ShapeHit> {
+        let (t, b1, b2) = self.ray(origin.as_dvec3(), direction.as_dvec3())?;
+        let inside = b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && in_range(t, t_range);
+        inside.then_some(ShapeHit { t: t as f32, u: b1 as f32, v: b2 as f32, local: Vec3::ZERO })
+    }
+
+    /// See [`super::Shape::sample`].
+    pub fn sample(&self, from: Vec3, u: Vec2) -> Option<ShapeSample> {
+        let seen = SphericalTriangle::new(&self.p, from);
+        if !SOLID_ANGLES.contains(&seen.solid_angle) {
+            let b = warp::uniform_triangle(u).as_dvec2();
+            return self.sample_at(b.x, b.y, |point, n| solid_angle_pdf(1.0 / f64::from(self.area), from, point, n));
+        }
+        let direction = seen.sample(u.x.into(), u.y.into());
+        let (_, b1, b2) = self.ray(from.as_dvec3(), direction)?;
+        // The direction lies inside the spherical triangle; what is outside the planar one is rounding.
+        let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
+        let excess = (b1 + b2).max(1.0);
+        let (b1, b2) = (b1 / excess, b2 / excess);
+        self.sample_at(1.0 - b1 - b2, b1, |_, _| (1.0 / seen.solid_angle) as f32)
+    }
+
+    /// See [`super::Shape::pdf`].
+    pub fn pdf(&self, from: Vec3, point: Vec3, n: Vec3) -> f32 {
+        let solid_angle = SphericalTriangle::new(&self.p, from).solid_angle;
+        if SOLID_ANGLES.contains(&solid_angle) {
+            (1.0 / solid_angle) as f32
+        } else {
+            finite_solid_angle_pdf(1.0 / f64::from(self.area), from, point, n)
+        }
+    }
+
+    /// The sample at barycentric coordinates `b0`, `b1` of vertices 0 and 1.
+    fn sample_at(&self, b0: f64, b1: f64, pdf: impl FnOnce(Vec3, Vec3) -> f32) -> Option<ShapeSample> {
+        let [p0, p1, p2] = self.p.map(Vec3::as_dvec3);
+        let b2 = 1.0 - b0 - b1;
+        let mut point = rounded(p0 * b0 + p1 * b1 + p2 * b2, DVec3::ZERO);
+        // A shadow ray must end before the plane that it will be tested against.
+        let deviation = self.tilt * (point.p - self.p[0]).length();
+        point.error += self.n.abs() * deviation;
+        let b = [b0 as f32, b1 as f32, b2 as f32];
+        let side = b[0] * self.facing[0] + b[1] * self.facing[1] + b[2] * self.facing[2];
+        let n = if side < 0.0 { -self.n } else { self.n };
+        let uv = self.uv[0] * b[0] + self.uv[1] * b[1] + self.uv[2] * b[2];
+        usable(point, n, uv, pdf(point.p, n))
+    }
+
+    /// Ray parameter and barycentric coordinates of vertices 1 and 2 where the line meets the plane.
+    ///
+    /// **Source**: \[Moeller97\].
+    fn ray(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
+        let [p0, p1, p2] = self.p.map(Vec3::as_dvec3);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let s1 = direction.cross(e2);
+        let divisor = s1.dot(e1);
+        if divisor == 0.0 {
+            return None;
+        }
+        let s = origin - p0;
+        let s2 = s.cross(e1);
+        Some((e2.dot(s2) / divisor, s.dot(s1) / divisor, direction.dot(s2) / divisor))
+    }
+}
+
+/// The directions from a point to a triangle, as a triangle on the unit sphere.
+struct SphericalTriangle {
+    a: DVec3,
+    b: DVec3,
+    c: DVec3,
+    /// |a · (b × c)|
+    volume: f64,
+    /// Steradians; NaN from a vertex.
+    solid_angle: f64,
+}
+
+impl SphericalTriangle {
+    /// **Source** of the solid angle: \[Oosterom83\] equation 8.
+    fn new(p: &[Vec3; 3], from: Vec3) -> Self {
+        let [a, b, c] = p.map(|p| (p.as_dvec3() - from.as_dvec3()).normalize());
+        let volume = a.dot(b.cross(c)).abs();
+        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+        Self { a, b, c, volume, solid_angle }
+    }
+
+    /// A direction uniform in solid angle.
+    ///
+    /// **Source**: \[Arvo95\]. Differences that cancel for small triangles are written as products: cos Â − 1 as
+    /// −2 sin²(Â/2), and 1 − a·b as |a − b|²/2.
+    fn sample(&self, u0: f64, u1: f64) -> DVec3 {
+        let Self { a, b, c, volume, solid_angle } = *self;
+        let (normal_ab, normal_ac) = (a.cross(b), a.cross(c));
+        let lengths = normal_ab.length() * normal_ac.length();
+        // The angle at vertex a.
+        let (sin_alpha, cos_alpha) = (volume / lengths, normal_ab.dot(normal_ac) / lengths);
+
+        // Choose the area of the sub-triangle a, b, ĉ, and find ĉ on the arc from a to c that gives it.
+        let half_area = 0.5 * (u0 * solid_angle).min(2.0 * PI);
+        let (sin_half, cos_half) = half_area.sin_cos();
+        let (sin_area, one_minus_cos_area) = (2.0 * sin_half * cos_half, 2.0 * sin_half * sin_half);
+        let cos_area = 1.0 - one_minus_cos_area;
+        let s = sin_area * cos_alpha - cos_area * sin_alpha;
+        let t = cos_area * cos_alpha + sin_area * sin_alpha;
+        let u = sin_area * sin_alpha - one_minus_cos_area * cos_alpha;
+        let v = sin_area * cos_alpha + sin_alpha * (one_minus_cos_area - 0.5 * (a - b).length_squared());
+        let q = ((v * t - u * s) * cos_alpha - v) / ((v * s + u * t) * sin_alpha);
+        let q = if q.is_finite() { q.clamp(-1.0, 1.0) } else { 1.0 };
+        let c_hat = a * q + orthogonal_part(c, a) * (1.0 - q * q).max(0.0).sqrt();
+
+        // Choose the direction on the arc from b to ĉ.
+        let drop = u1 * 0.5 * (c_hat - b).length_squared();
+        b * (1.0 - drop) + orthogonal_part(c_hat, b) * (drop * (2.0 - drop)).max(0.0).sqrt()
+    }
+}
+
+/// The unit vector in the direction of the part of `v` orthogonal to the unit vector `axis`.
+fn orthogonal_part(v: DVec3, axis: DVec3) -> DVec3 {
+    (v - axis * v.dot(axis)).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::testing::{Points, check_sampling, random_vec3};
+    use super::super::{Shape, usable};
+    use super::*;
+
+    fn shape(p: [Vec3; 3]) -> Shape {
+        Shape::Triangle(Triangle::new(p, None, None, false).unwrap())
+    }
+
+    #[test]
+    fn samples_follow_the_density_from_near_far_and_grazing() {
+        let triangle = shape([Vec3::new(-1.0, 0.2, 0.0), Vec3::new(1.3, -0.4, 0.1), Vec3::new(0.3, 1.5, -0.2)]);
+        let from = [
+            Vec3::new(0.1, 0.3, 1.0),
+            Vec3::new(0.2, 0.3, -0.05),
+            Vec3::new(3.0, 2.0, 0.2),
+            Vec3::new(-30.0, 40.0, 90.0),
+            Vec3::new(2.0, 0.4, 0.2),
+        ];
+        check_sampling(&triangle, &from);
+        let sliver = shape([Vec3::ZERO, Vec3::new(2.0, 0.0, 0.0), Vec3::new(1.0, 5e-2, 0.0)]);
+        check_sampling(&sliver, &[Vec3::new(1.0, 0.0, 0.5)]);
+    }
+
+    #[test]
+    fn an_octant_is_an_eighth_of_the_sphere() {
+        let octant = SphericalTriangle::new(&[Vec3::X, Vec3::Y, Vec3::Z], Vec3::ZERO);
+        assert!((octant.solid_angle - PI / 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_side_follows_the_vertex_normals() {
+        let p = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let sample = |normals, flipped| {
+            let triangle = Triangle::new(p, None, normals, flipped).unwrap();
+            triangle.sample(Vec3::new(0.2, 0.2, 1.0), Vec2::splat(0.5)).unwrap().n
+        };
+        assert_eq!(sample(None, false), Vec3::Z);
+        assert_eq!(sample(None, true), Vec3::NEG_Z);
+        assert_eq!(sample(Some([Vec3::NEG_Z; 3]), false), Vec3::NEG_Z);
+    }
+
+    #[test]
+    fn without_area_there_is_no_triangle_and_edge_on_no_sample() {
+        assert!(Triangle::new([Vec3::ZERO, Vec3::X, Vec3::X * 2.0], None, None, false).is_none());
+        assert!(Triangle::new([Vec3::ZERO, Vec3::X, Vec3::NAN], None, None, false).is_none());
+        let triangle = Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], None, None, false).unwrap();
+        assert_eq!(triangle.sample(Vec3::new(5.0, 0.0, 0.0), Vec2::splat(0.3)), None);
+        assert!(usable(Default::default(), Vec3::Z, Vec2::ZERO, f32::NAN).is_none());
+    }
+
+    proptest! {
+        #[test]
+        fn samples_are_on_the_triangle_within_their_error(seed: u64) {
+            let mut points = Points::new(seed);
+            let p: [Vec3; 3] = std::array::from_fn(|_| random_vec3(&mut points) * 100.0);
+            let triangle = Triangle::new(p, None, None, false).unwrap();
+            let from = random_vec3(&mut points) * 100.0;
+            if let Some(sample) = triangle.sample(from, points.square()) {
+                let [p0, p1, p2] = p.map(Vec3::as_dvec3);
+                let n = (p1 - p0).cross(p2 - p0).normalize();
+                let height = (sample.point.p.as_dvec3() - p0).dot(n).abs();
+                prop_assert!(height <= n.abs().dot(sample.point.error.as_dvec3()), "{height}");
+                prop_assert!((sample.pdf / triangle.pdf(from, sample.point.p, sample.n) - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+}
