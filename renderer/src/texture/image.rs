@@ -82,6 +82,8 @@ pub struct Texels {
     pub data: TexelData,
     /// Of the bytes.
     pub encoding: Encoding,
+    /// It is the file's alpha channel.
+    pub alpha: bool,
     /// How many values were not finite and became 0.
     pub replaced: usize,
 }
@@ -137,7 +139,7 @@ pub fn load_texels(path: &Path, channels: Channels, encoding: Option<Encoding>) 
             (TexelData::Float(floats), channels)
         }
     };
-    Ok(Texels { width, height, channels, data, encoding: integers_are, replaced })
+    Ok(Texels { width, height, channels, data, encoding: integers_are, alpha: masked.is_some(), replaced })
 }
 
 /// Where the wanted channels are among those of the file.
