@@ -17,6 +17,8 @@ mod infinite;
 mod mis;
 mod octahedral;
 mod point;
+#[cfg(test)]
+mod testing;
 mod tree;
 
 use std::sync::Arc;

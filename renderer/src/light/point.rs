@@ -41,11 +41,6 @@ impl PointLight {
         self.position
     }
 
-    /// What it emits.
-    pub fn emission(&self) -> &Emission {
-        &self.emission
-    }
-
     /// Radiant intensity (W/sr) along the unit direction `w`, which leads away from the light in the world.
     #[inline]
     pub fn intensity(&self, w: Vec3) -> Rgb {
@@ -89,11 +84,6 @@ impl Spot {
     /// Where the edge begins and ends, radians.
     pub fn angles(&self) -> [f64; 2] {
         [self.start, self.end]
-    }
-
-    /// Intensity on the axis.
-    pub fn peak(&self) -> Rgb {
-        self.intensity
     }
 
     /// The integral over all directions of the intensity over that on the axis, sr. A smooth step has the mean ½.
