@@ -83,7 +83,7 @@ pub const ALL_DIRECTIONS: (DVec3, f64) = (DVec3::Z, PI);
 pub fn cone_from_cosine(axis: Vec3, cos: f32) -> (DVec3, f64) {
     match axis.as_dvec3().try_normalize() {
         Some(axis) if cos >= 1.0 => (axis, 0.0),
-        Some(axis) => (axis, f64::from(cos.next_down().clamp(-1.0, 1.0)).acos()),
+        Some(axis) => (axis, f64::from((cos - f32::EPSILON).clamp(-1.0, 1.0)).acos()),
         None => ALL_DIRECTIONS,
     }
 }

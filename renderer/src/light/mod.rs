@@ -35,6 +35,9 @@ use infinite::Infinite;
 use point::PointLight;
 use tree::LightTree;
 
+/// The largest `f32` below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+
 /// All lights of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
@@ -141,7 +144,7 @@ impl Lights {
             return self.sample_infinite(choice as usize, from, u);
         }
         // What is left of the number, in [0, 1).
-        let rest = (choice - self.sampled_infinite as f32).clamp(0.0, 1.0_f32.next_down());
+        let rest = (choice - self.sampled_infinite as f32).clamp(0.0, BELOW_ONE);
         let (light, pmf) = self.tree.choose(from, rest)?;
         let pmf = pmf * self.bounded_pmf();
         match self.emitters.get(light as usize) {

@@ -8,8 +8,8 @@
 
 use glam::Vec3;
 
-use super::Receiver;
 use super::bounds::LightBounds;
+use super::{BELOW_ONE, Receiver};
 
 pub(super) mod build;
 
@@ -126,7 +126,7 @@ fn choose_lane(importance: &[f32; WIDTH], target: f32) -> Option<(usize, f32)> {
         before += value;
     }
     let (lane, before) = chosen?;
-    Some((lane, ((target - before) / importance[lane]).clamp(0.0, 1.0_f32.next_down())))
+    Some((lane, ((target - before) / importance[lane]).clamp(0.0, BELOW_ONE)))
 }
 
 impl Node {
@@ -177,7 +177,7 @@ impl Node {
         // Without a normal the cosine at the receiver counts as 1.
         let least_cos_i = if n == Vec3::ZERO { 1.0 } else { 0.0 };
         let mut importance = [0.0; WIDTH];
-        for i in 0..WIDTH {
+        for (i, importance) in importance.iter_mut().enumerate() {
             // From the centre to the receiver.
             let x = (p.x - self.center[0][i]) * per_scene;
             let y = (p.y - self.center[1][i]) * per_scene;
@@ -211,7 +211,7 @@ impl Node {
 
             let distance2 = max(max(d2, radius * radius), CLOSEST_SQUARED);
             let value = self.intensity[i] * cos_l * max(cos_r, least_cos_i) / distance2;
-            importance[i] = if (cos_l > self.cos_e[i]) & !behind { value } else { 0.0 };
+            *importance = if (cos_l > self.cos_e[i]) & !behind { value } else { 0.0 };
         }
         importance
     }
