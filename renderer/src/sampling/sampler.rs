@@ -60,7 +60,8 @@ impl Numbers {
     #[inline]
     pub fn d2(&self, dimension: Dimension) -> Vec2 {
         let seeds = self.seeds(dimension);
-        let seed_y = mix64(seeds ^ GOLDEN) as u32;
+        // A third seed from both: the upper half of the product depends on all of its bits.
+        let seed_y = (seeds.wrapping_mul(GOLDEN) >> 32) as u32;
         let index = nested_hash(self.reversed_index, seeds as u32).reverse_bits();
         let x = nested_hash(index, (seeds >> 32) as u32);
         let y = nested_hash(second_sobol_reversed(index), seed_y);

@@ -41,9 +41,11 @@ pub struct ConductorTable {
 const INTERVALS: usize = 128;
 
 impl ConductorTable {
-    /// The table of a conductor with indices `eta` and `k` under a dielectric of index `eta_outside` (1: air).
+    /// The table of a conductor with indices `eta` and `k` under a dielectric of index `eta_outside` (1: air). Where only one
+    /// of the two is RGB, the other becomes RGB as [`Spectrum::unbounded_rgb`].
     pub fn new(eta: &Spectrum, k: &Spectrum, eta_outside: f32) -> Self {
-        let outside = f64::from(eta_outside);
+        // An index of 0 or less, which is none, must not become a NaN.
+        let outside = f64::from(eta_outside.max(f32::MIN_POSITIVE));
         let reflectance: Box<dyn Fn(f64) -> DVec3> = match (eta, k) {
             (Spectrum::Rgb(_), _) | (_, Spectrum::Rgb(_)) => {
                 let (eta, k) = (eta.unbounded_rgb().as_dvec3() / outside, k.unbounded_rgb().as_dvec3() / outside);
@@ -51,11 +53,14 @@ impl ConductorTable {
                     DVec3::from_array([0, 1, 2].map(|c| fresnel_conductor(cos_theta, eta[c], k[c])))
                 })
             }
-            _ => Box::new(move |cos_theta| {
-                observer::rgb_under_d65(|lambda| {
-                    fresnel_conductor(cos_theta, eta.value(lambda) / outside, k.value(lambda) / outside)
+            _ => {
+                let index = |lambda: f64| (eta.value(lambda) / outside, k.value(lambda) / outside);
+                let indices: Vec<(f64, f64)> = observer::wavelengths().map(index).collect();
+                Box::new(move |cos_theta| {
+                    let spectrum = indices.iter().map(|&(eta, k)| fresnel_conductor(cos_theta, eta, k));
+                    observer::weigh_under_d65(spectrum)
                 })
-            }),
+            }
         };
         Self {
             reflectance: Box::new(std::array::from_fn(|i| {
@@ -68,7 +73,7 @@ impl ConductorTable {
     #[inline]
     pub fn reflectance(&self, cos_theta: f32) -> Rgb {
         let x = cos_theta.clamp(0.0, 1.0) * INTERVALS as f32;
-        // A NaN becomes 0 here, and the minimum keeps cosθ = 1 in the last interval.
+        // The minimum keeps cosθ = 1 in the last interval.
         let low = (x as usize).min(INTERVALS - 1);
         let t = x - low as f32;
         self.reflectance[low] * (1.0 - t) + self.reflectance[low + 1] * t
@@ -179,8 +184,11 @@ mod tests {
     fn look_ups_stay_in_the_table() {
         let (eta, k) = metal("Au");
         let table = ConductorTable::new(&eta, &k, 1.0);
-        for cos_theta in [-1.0, -0.0, 1.0, 2.0, f32::INFINITY] {
+        for cos_theta in [-1.0, -0.0, 1.0, 2.0, f32::INFINITY, f32::NEG_INFINITY] {
             assert!(table.reflectance(cos_theta).is_finite());
+        }
+        for outside in [0.0, -1.0, f32::NAN] {
+            assert!(ConductorTable::new(&eta, &k, outside).reflectance(0.5).is_finite());
         }
         assert_eq!(table.reflectance(-1.0), table.reflectance(0.0));
         assert_eq!(table.reflectance(2.0), table.reflectance(1.0));

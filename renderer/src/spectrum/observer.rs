@@ -54,7 +54,8 @@ fn matching_at(i: usize) -> DVec3 {
     cubic.max(DVec3::ZERO)
 }
 
-fn wavelengths() -> impl Iterator<Item = f64> {
+/// The wavelengths (nm) of all integrals.
+pub(super) fn wavelengths() -> impl Iterator<Item = f64> {
     (FIRST..FIRST + COUNT).map(|nm| nm as f64)
 }
 
@@ -65,7 +66,12 @@ pub(super) fn xyz(spectrum: impl Fn(f64) -> f64) -> DVec3 {
 
 /// Linear Rec.709 RGB, unclamped, of a reflectance spectrum under D65.
 pub(super) fn rgb_under_d65(reflectance: impl Fn(f64) -> f64) -> DVec3 {
-    wavelengths().zip(&OBSERVER.d65_weights).map(|(lambda, &weight)| reflectance(lambda) * weight).sum()
+    weigh_under_d65(wavelengths().map(reflectance))
+}
+
+/// [`rgb_under_d65`] of reflectances at all [`wavelengths`].
+pub(super) fn weigh_under_d65(reflectances: impl Iterator<Item = f64>) -> DVec3 {
+    reflectances.zip(&OBSERVER.d65_weights).map(|(reflectance, &weight)| reflectance * weight).sum()
 }
 
 /// XYZ of D65 at Y = 1.
