@@ -44,8 +44,10 @@ pub struct Place {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// The text of that line, without its end.
+    /// The text of that line around the place, without the line's end: a line of a mesh can be megabytes long.
     pub text: String,
+    /// How many characters of `text` stand before the place.
+    pub before: usize,
     /// How many characters of the line are meant, at least 1.
     pub width: usize,
 }
@@ -57,16 +59,11 @@ impl fmt::Display for Diagnostic {
             Severity::Error => "error",
         };
         let Some(place) = &self.place else { return write!(f, "{word}: {}", self.message) };
-        // A line of a mesh can be megabytes long: show a window of it around the place.
-        const WINDOW: usize = 100;
-        let column = place.column - 1;
-        let from = column.saturating_sub(WINDOW / 2);
-        let shown: String =
-            place.text.chars().skip(from).take(WINDOW).map(|c| if c.is_control() { ' ' } else { c }).collect();
-        let room = shown.chars().count().saturating_sub(column - from).max(1);
+        let shown: String = place.text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let room = shown.chars().count().saturating_sub(place.before).max(1);
         writeln!(f, "{}:{}:{}: {word}: {}", place.path.display(), place.line, place.column, self.message)?;
         writeln!(f, "  {shown}")?;
-        write!(f, "  {}{}", " ".repeat(column - from), "^".repeat(place.width.clamp(1, room)))
+        write!(f, "  {}{}", " ".repeat(place.before), "^".repeat(place.width.clamp(1, room)))
     }
 }
 
@@ -93,20 +90,14 @@ impl SourceMap {
         self.files.iter().map(|(path, _)| path.as_path())
     }
 
-    /// Resolves a span to line and column.
+    /// Resolves a span to line and column. For many spans use [`Self::places`].
     pub fn place(&self, span: Span) -> Place {
-        let (path, text) = &self.files[span.file as usize];
-        let start = (span.start as usize).min(text.len());
-        let line_start = text[..start].iter().rposition(|&b| b == b'\n').map_or(0, |at| at + 1);
-        let line_end = text[start..].iter().position(|&b| b == b'\n').map_or(text.len(), |at| start + at);
-        let end = (span.end as usize).clamp(start, line_end);
-        Place {
-            path: path.clone(),
-            line: 1 + text[..start].iter().filter(|&&b| b == b'\n').count(),
-            column: 1 + String::from_utf8_lossy(&text[line_start..start]).chars().count(),
-            text: String::from_utf8_lossy(&text[line_start..line_end]).trim_end_matches('\r').to_owned(),
-            width: String::from_utf8_lossy(&text[start..end]).chars().count().max(1),
-        }
+        self.places().place(span)
+    }
+
+    /// A resolver for many spans: it looks for the lines of a file once.
+    pub fn places(&self) -> Places<'_> {
+        Places { sources: self, lines: vec![None; self.files.len()] }
     }
 
     /// A warning at `span`.
@@ -117,6 +108,47 @@ impl SourceMap {
     /// An error at `span`.
     pub fn error(&self, span: Span, message: impl Into<String>) -> Diagnostic {
         Diagnostic { severity: Severity::Error, message: message.into(), place: Some(self.place(span)) }
+    }
+}
+
+/// Resolves spans of a [`SourceMap`]. See [`SourceMap::places`].
+#[derive(Debug)]
+pub struct Places<'s> {
+    sources: &'s SourceMap,
+    /// Offset of the first byte of each line, of the files that were asked for.
+    lines: Vec<Option<Vec<usize>>>,
+}
+
+impl Places<'_> {
+    /// Line and column of a span. A span of no known file resolves to line 1 of no file.
+    pub fn place(&mut self, span: Span) -> Place {
+        let Some((path, text)) = self.sources.files.get(span.file as usize) else {
+            return Place { path: PathBuf::new(), line: 1, column: 1, text: String::new(), before: 0, width: 1 };
+        };
+        let lines = self.lines[span.file as usize].get_or_insert_with(|| {
+            let ends = text.iter().enumerate().filter(|&(_, &b)| b == b'\n');
+            std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect()
+        });
+        let start = (span.start as usize).min(text.len());
+        let line = lines.partition_point(|&first| first <= start);
+        let line_start = lines[line - 1];
+        let line_end = lines.get(line).map_or(text.len(), |&next| next - 1);
+        let end = (span.end as usize).clamp(start, line_end.max(start));
+
+        // A window of the line, cut between characters.
+        const REACH: usize = 60;
+        let is_boundary = |&at: &usize| at >= text.len() || (text[at] & 0xc0) != 0x80;
+        let from = (line_start.max(start.saturating_sub(REACH))..=start).find(is_boundary).unwrap_or(start);
+        let to = (start..=line_end.min(start + REACH).max(start)).rev().find(is_boundary).unwrap_or(start);
+        let before = String::from_utf8_lossy(&text[from..start]);
+        Place {
+            path: path.clone(),
+            line,
+            column: 1 + String::from_utf8_lossy(&text[line_start..start]).chars().count(),
+            before: before.chars().count(),
+            width: String::from_utf8_lossy(&text[start..end]).chars().count().max(1),
+            text: (before + String::from_utf8_lossy(&text[start..to])).trim_end_matches('\r').to_owned(),
+        }
     }
 }
 
@@ -134,5 +166,26 @@ mod tests {
             error.to_string(),
             "a.pbrt:2:11: error: no such shape\n    \u{e9} Shape \"cone\"\n            ^^^^^^"
         );
+    }
+
+    #[test]
+    fn a_long_line_is_shown_around_the_place() {
+        let mut sources = SourceMap::default();
+        let line = format!("{}\u{e9}here{}\nnext", "\u{e9}".repeat(5000), "x".repeat(5000));
+        let file = sources.add(Path::new("a.pbrt"), Arc::from(line.as_bytes()));
+        let place = sources.place(Span { file, start: 10002, end: 10006 });
+        assert_eq!((place.line, place.column, place.width), (1, 5002, 4));
+        assert!(place.text.chars().count() < 200);
+        assert_eq!(place.text.chars().skip(place.before).take(4).collect::<String>(), "here");
+    }
+
+    #[test]
+    fn spans_beyond_the_text_or_of_no_file_resolve() {
+        let mut sources = SourceMap::default();
+        let file = sources.add(Path::new("a.pbrt"), Arc::from("ab\n".as_bytes()));
+        let place = sources.place(Span { file, start: 3, end: 9 });
+        assert_eq!((place.line, place.column, place.text.as_str()), (2, 1, ""));
+        assert_eq!(sources.place(Span { file, start: 2, end: 2 }).column, 3);
+        assert_eq!(sources.place(Span { file: 7, start: 0, end: 0 }).line, 1);
     }
 }

@@ -1,0 +1,548 @@
+//! The state machine of a scene file: what each directive does to the state, and what it adds to the scene.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::context::{Context, Names};
+use super::lexer::Lexer;
+use super::materials::{MaterialEntity, MaterialTable};
+use super::media;
+use super::options::Options;
+use super::params::Params;
+use super::report::{did_you_mean, shown};
+use super::shapes;
+use super::source::{Cursor, read_file};
+use super::spectra::ColorSpace;
+use super::state::{self, Attributes, CoordinateSystems, State, Transforms};
+use super::syntax::{Directive, Entity, read_directive};
+use super::textures::{TextureEntity, TextureTable, TextureValues};
+use crate::math::Transform;
+use crate::scene::Span;
+use crate::scene::description::{AreaLightId, MaterialId, Medium, MediumId, Shape};
+
+/// Files within files beyond this include themselves or are not meant to be read.
+const DEEPEST_INCLUDE: usize = 64;
+
+/// Files beyond this are an accident: files that each include another one twice double with every level.
+const MOST_INCLUDES: usize = 1 << 20;
+
+/// The material of a shape, before all materials are known.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum MaterialRef {
+    /// By its place in the table.
+    Slot(usize),
+    /// By its name.
+    Named(String, Span),
+}
+
+/// An object as read.
+#[derive(Debug)]
+pub(super) struct ObjectEntity {
+    pub(super) name: Arc<str>,
+    pub(super) shapes: Vec<Shape>,
+    pub(super) instances: Vec<InstanceEntity>,
+    pub(super) span: Span,
+}
+
+/// A placed object as read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InstanceEntity {
+    /// Number of the object's name in [`World::object_names`].
+    pub(super) name: u32,
+    pub(super) transform: Transform,
+    pub(super) span: Span,
+}
+
+/// What the directives have added so far. Shapes refer to materials, textures and media by the numbers of their names.
+pub(super) struct World {
+    pub(super) textures: TextureTable,
+    pub(super) materials: MaterialTable,
+    pub(super) material_refs: Vec<MaterialRef>,
+    pub(super) lights: Vec<(Params, Transform)>,
+    pub(super) area_lights: Vec<Params>,
+    pub(super) media: BTreeMap<String, Option<Medium>>,
+    pub(super) medium_names: Names<String>,
+    pub(super) shapes: Vec<Shape>,
+    pub(super) objects: Vec<ObjectEntity>,
+    pub(super) object_names: Names<String>,
+    pub(super) instances: Vec<InstanceEntity>,
+}
+
+/// What an end directive has to close.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Block {
+    Attribute,
+    Object,
+}
+
+/// The reader of a scene.
+pub(super) struct Reader {
+    pub(super) cx: Context,
+    pub(super) options: Options,
+    pub(super) world: World,
+    in_world: bool,
+    state: State,
+    stack: Vec<(Block, Span, State)>,
+    systems: CoordinateSystems,
+    /// The numbers of named materials in `world.material_refs`.
+    named_materials: BTreeMap<String, u32>,
+    /// Index of the object that is being defined.
+    open_object: Option<usize>,
+    /// The files that are being read, innermost last.
+    open_files: Vec<PathBuf>,
+    includes: usize,
+}
+
+impl Reader {
+    pub(super) fn new(folder: PathBuf) -> Self {
+        Self {
+            cx: Context::new(folder),
+            options: Options::default(),
+            world: World {
+                textures: TextureTable::default(),
+                materials: MaterialTable::new(),
+                material_refs: vec![MaterialRef::Slot(0)],
+                lights: Vec::new(),
+                area_lights: Vec::new(),
+                media: BTreeMap::new(),
+                medium_names: Names::default(),
+                shapes: Vec::new(),
+                objects: Vec::new(),
+                object_names: Names::default(),
+                instances: Vec::new(),
+            },
+            in_world: false,
+            state: State::default(),
+            stack: Vec::new(),
+            systems: CoordinateSystems::new(),
+            named_materials: BTreeMap::new(),
+            open_object: None,
+            open_files: Vec::new(),
+            includes: 0,
+        }
+    }
+
+    /// Reads the text of a scene and everything that it includes.
+    pub(super) fn read(&mut self, path: &Path, text: Vec<u8>) {
+        self.open_files.push(path.to_owned());
+        self.read_text(path, text, None);
+        self.open_files.pop();
+        if !self.in_world {
+            self.cx.report.error_nowhere("the scene has no WorldBegin: there is nothing to see");
+        }
+    }
+
+    /// Reads one file. `from` is where it was included.
+    fn read_text(&mut self, path: &Path, text: Vec<u8>, from: Option<Span>) {
+        let (file, text) = match self.cx.files.add(path, text) {
+            Ok(added) => added,
+            Err(why) => {
+                let text = format!("{}: {why}", path.display());
+                match from {
+                    Some(span) => self.cx.report.error(span, text),
+                    None => self.cx.report.error_nowhere(text),
+                }
+                return;
+            }
+        };
+        if text.starts_with(&[0xfe, 0xff]) || text.starts_with(&[0xff, 0xfe]) {
+            self.cx.report.error(Span { file, start: 0, end: 2 }, "the file is UTF-16: save it as UTF-8");
+            return;
+        }
+        let opened = self.stack.len();
+        let mut lexer = Lexer::new(&text);
+        loop {
+            let mut cursor = Cursor::new(lexer, file, &mut self.cx.report);
+            let directive = match read_directive(&mut cursor, self.state.color_space) {
+                None => break,
+                Some(Ok(directive)) => Some(directive),
+                Some(Err(_)) => {
+                    cursor.recover();
+                    None
+                }
+            };
+            lexer = cursor.into_lexer();
+            if let Some((directive, span)) = directive {
+                self.apply(directive, span);
+            }
+        }
+        // What this file opened and left open: told here, where the file is known.
+        for (block, span, state) in self.stack.drain(opened.min(self.stack.len())..).rev() {
+            let text = match block {
+                Block::Attribute => "AttributeBegin has no AttributeEnd",
+                Block::Object => "ObjectBegin has no ObjectEnd",
+            };
+            self.cx.report.error(span, text);
+            self.state = state;
+            if block == Block::Object {
+                self.open_object = None;
+            }
+        }
+    }
+
+    fn apply(&mut self, directive: Directive, span: Span) {
+        match directive {
+            Directive::Identity => self.state.set(Transform::default()),
+            Directive::Translate(by) => self.state.concat(state::translate(by)),
+            Directive::Scale(by) => self.concat(state::scale(by), span, "a factor of 0 has no inverse"),
+            Directive::Rotate(by) => self.concat(state::rotate(by), span, "the axis has no length"),
+            Directive::LookAt(at) => {
+                self.concat(state::look_at(at), span, "the eye is at its target, or up is along the view");
+            }
+            Directive::ConcatTransform(m) => self.concat(state::matrix(m), span, "the matrix has no inverse"),
+            Directive::Transform(m) => match state::matrix(m) {
+                Some(transform) => self.state.set(transform),
+                None => self.cx.report.error(span, "the matrix has no inverse"),
+            },
+            // The times between which a shape moves: motion is not rendered, and is warned of where it happens.
+            Directive::TransformTimes(_) => self.only_before_world("TransformTimes", span),
+            Directive::ActiveTransform(active) => self.state.active = active,
+            Directive::CoordinateSystem(name) => {
+                self.systems.insert(name, self.state.transforms);
+            }
+            Directive::CoordSysTransform(name) => self.coord_sys_transform(&name, span),
+            Directive::ColorSpace(name) => self.color_space(&name, span),
+            Directive::ReverseOrientation => {
+                self.only_in_world("ReverseOrientation", span);
+                self.state.reverse_orientation = !self.state.reverse_orientation;
+            }
+            Directive::AttributeBegin => self.open(Block::Attribute, "AttributeBegin", span),
+            Directive::AttributeEnd => self.close(Block::Attribute, "AttributeEnd", span),
+            Directive::TransformBegin => {
+                let text = "TransformBegin and TransformEnd are the older names of AttributeBegin and AttributeEnd";
+                self.cx.report.warning("TransformBegin", span, text);
+                self.open(Block::Attribute, "TransformBegin", span);
+            }
+            Directive::TransformEnd => self.close(Block::Attribute, "TransformEnd", span),
+            Directive::WorldBegin => self.world_begin(span),
+            Directive::WorldEnd => {
+                self.cx.report.warning("WorldEnd", span, "WorldEnd belongs to older versions of the format: ignored");
+            }
+            Directive::ObjectBegin(name) => self.object_begin(name, span),
+            Directive::ObjectEnd => self.object_end(span),
+            Directive::ObjectInstance(name) => self.object_instance(name, span),
+            Directive::NamedMaterial(name) => self.named_material(name, span),
+            Directive::MediumInterface(inside, outside) => self.medium_interface(inside, outside, span),
+            Directive::Include(name) => self.include(&name, span),
+            Directive::Import(name) => self.import(&name, span),
+            Directive::Option { name, value } => self.options.set(&mut self.cx, &name, &value, span),
+            Directive::Texture { name, values, class, params } => {
+                self.only_in_world("Texture", span);
+                let params = Params::new("texture", class, span, params, &self.state.attributes.texture);
+                self.texture(name, &values, params);
+            }
+            Directive::Entity(entity, name, params) => self.entity(entity, name, params, span),
+        }
+    }
+
+    fn concat(&mut self, transform: Option<Transform>, span: Span, why_not: &str) {
+        match transform {
+            Some(transform) => self.state.concat(transform),
+            None => self.cx.report.error(span, why_not),
+        }
+    }
+
+    fn only_in_world(&mut self, name: &str, span: Span) {
+        if !self.in_world {
+            self.cx.report.error(span, format!("{name} belongs after WorldBegin"));
+        }
+    }
+
+    fn only_before_world(&mut self, name: &str, span: Span) {
+        if self.in_world {
+            self.cx.report.error(span, format!("{name} belongs before WorldBegin"));
+        }
+    }
+
+    fn coord_sys_transform(&mut self, name: &str, span: Span) {
+        if let Some(transforms) = self.systems.get(name) {
+            self.state.transforms = *transforms;
+            return;
+        }
+        let mut known: Vec<&str> = self.systems.keys().map(String::as_str).collect();
+        known.sort_unstable();
+        let hint = did_you_mean(name, known);
+        self.cx.report.error(span, format!("there is no coordinate system \"{}\"{hint}", shown(name)));
+    }
+
+    fn color_space(&mut self, name: &str, span: Span) {
+        match ColorSpace::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
+            Some(&(_, space)) => self.state.color_space = space,
+            None => {
+                let known: Vec<&str> = ColorSpace::NAMES.iter().map(|&(known, _)| known).collect();
+                self.cx.unknown_type("colour space", name, span, &known);
+            }
+        }
+    }
+
+    fn open(&mut self, block: Block, name: &str, span: Span) {
+        // A thousand levels are more than any scene has, and as many as a file of nothing else may cost.
+        const DEEPEST: usize = 10_000;
+        self.only_in_world(name, span);
+        if self.stack.len() == DEEPEST {
+            self.cx.report.error(span, format!("more than {DEEPEST} blocks within each other"));
+        }
+        if self.stack.len() < DEEPEST {
+            self.stack.push((block, span, self.state.clone()));
+        }
+    }
+
+    fn close(&mut self, block: Block, name: &str, span: Span) {
+        match self.stack.last() {
+            Some((open, ..)) if *open == block => {
+                if let Some((_, _, state)) = self.stack.pop() {
+                    self.state = state;
+                }
+            }
+            Some((Block::Object, ..)) => {
+                self.cx.report.error(span, format!("{name} within an object: the open block is an ObjectBegin"));
+            }
+            Some(_) => self.cx.report.error(span, format!("{name}, but the open block is an AttributeBegin")),
+            None => self.cx.report.error(span, format!("{name} has nothing to end")),
+        }
+    }
+
+    fn world_begin(&mut self, span: Span) {
+        if self.in_world {
+            self.cx.report.error(span, "WorldBegin is given twice");
+            return;
+        }
+        self.in_world = true;
+        self.state.transforms = Transforms::default();
+        self.state.active = [true, true];
+        self.systems.insert("world".to_owned(), self.state.transforms);
+    }
+
+    /// The transform at the start of the shutter; motion is told and not drawn.
+    fn placed(&mut self, what: &str, span: Span) -> Transform {
+        if self.state.moves() {
+            let text = format!("the motion of a {what} is not rendered: it is drawn where it starts");
+            self.cx.report.warning(format!("motion {what}"), span, text);
+        }
+        self.state.transforms[0]
+    }
+
+    fn object_begin(&mut self, name: String, span: Span) {
+        self.open(Block::Object, "ObjectBegin", span);
+        if self.open_object.is_some() {
+            self.cx.report.error(span, "ObjectBegin within an object");
+            return;
+        }
+        if self.world.objects.iter().any(|object| *object.name == *name) {
+            self.cx.report.error(span, format!("there is already an object \"{}\"", shown(&name)));
+        }
+        self.open_object = Some(self.world.objects.len());
+        let (shapes, instances) = (Vec::new(), Vec::new());
+        self.world.objects.push(ObjectEntity { name: name.into(), shapes, instances, span });
+    }
+
+    fn object_end(&mut self, span: Span) {
+        let depth = self.stack.len();
+        self.close(Block::Object, "ObjectEnd", span);
+        let closed = self.stack.len() < depth;
+        if closed && !self.stack.iter().any(|(block, ..)| *block == Block::Object) {
+            self.open_object = None;
+        }
+    }
+
+    fn object_instance(&mut self, name: String, span: Span) {
+        self.only_in_world("ObjectInstance", span);
+        let transform = self.placed("object instance", span);
+        let name = self.world.object_names.intern(name, span);
+        let instance = InstanceEntity { name, transform, span };
+        match self.open_object {
+            Some(object) => self.world.objects[object].instances.push(instance),
+            None => self.world.instances.push(instance),
+        }
+    }
+
+    fn named_material(&mut self, name: String, span: Span) {
+        self.only_in_world("NamedMaterial", span);
+        let refs = &mut self.world.material_refs;
+        self.state.material = *self.named_materials.entry(name.clone()).or_insert_with(|| {
+            refs.push(MaterialRef::Named(name, span));
+            refs.len() as u32 - 1
+        });
+    }
+
+    fn medium_interface(&mut self, inside: String, outside: String, span: Span) {
+        let mut medium =
+            |name: String| (!name.is_empty()).then(|| MediumId(self.world.medium_names.intern(name, span)));
+        self.state.media = [medium(inside), medium(outside)];
+    }
+
+    fn texture(&mut self, name: String, values: &str, params: Params) {
+        let span = params.span;
+        let values = match values {
+            "float" => TextureValues::Float,
+            "spectrum" => TextureValues::Spectrum,
+            // Its name before version 4.
+            "color" => {
+                self.cx.report.warning("color texture", span, "a texture of \"color\" is now one of \"spectrum\"");
+                TextureValues::Spectrum
+            }
+            other => {
+                let other = shown(other);
+                let text = format!("a texture is \"float\" or \"spectrum\", not \"{other}\"");
+                self.cx.report.error(span, text);
+                return;
+            }
+        };
+        let world_from_texture = self.placed("texture", span);
+        let shown_name = shown(&name);
+        if !self.world.textures.add(TextureEntity { name, values, params, world_from_texture }) {
+            self.cx.report.error(span, format!("there is already a texture \"{shown_name}\" of these values"));
+        }
+    }
+
+    fn entity(&mut self, entity: Entity, name: String, params: Vec<super::param::Param>, span: Span) {
+        let attributes = Arc::clone(&self.state.attributes);
+        let with = |what, inherited| Params::new(what, name.clone(), span, params.clone(), inherited);
+        let _ = &with;
+        match entity {
+            Entity::Shape => {
+                self.only_in_world("Shape", span);
+                self.shape(Params::new("shape", name, span, params, &attributes.shape));
+            }
+            Entity::Light => {
+                self.only_in_world("LightSource", span);
+                let world_from_light = self.placed("light", span);
+                let params = Params::new("light", name, span, params, &attributes.light);
+                self.world.lights.push((params, world_from_light));
+            }
+            Entity::AreaLight => {
+                self.only_in_world("AreaLightSource", span);
+                self.state.area_light = Some(self.world.area_lights.len() as u32);
+                self.world.area_lights.push(Params::new("area light", name, span, params, &attributes.light));
+            }
+            Entity::Material => {
+                self.only_in_world("Material", span);
+                let params = Params::new("material", name, span, params, &attributes.material);
+                if let Some(slot) = self.world.materials.add(MaterialEntity { name: None, params }) {
+                    self.state.material = self.world.material_refs.len() as u32;
+                    self.world.material_refs.push(MaterialRef::Slot(slot));
+                }
+            }
+            Entity::NamedMaterial => {
+                self.only_in_world("MakeNamedMaterial", span);
+                let params = Params::new("material", name.clone(), span, params, &attributes.material);
+                if self.world.materials.add(MaterialEntity { name: Some(name.clone()), params }).is_none() {
+                    self.cx.report.error(span, format!("there is already a material named \"{}\"", shown(&name)));
+                }
+            }
+            Entity::NamedMedium => {
+                let mut params = Params::new("medium", name.clone(), span, params, &attributes.medium);
+                if self.world.media.contains_key(&name) {
+                    self.cx.report.error(span, format!("there is already a medium named \"{}\"", shown(&name)));
+                    return;
+                }
+                let medium = media::build(&mut self.cx, &mut params);
+                self.world.media.insert(name, medium);
+            }
+            Entity::Attribute => self.attribute(&name, params, span),
+            Entity::Camera => {
+                self.only_before_world("Camera", span);
+                let camera_from_world = self.placed("camera", span);
+                let systems = self.state.transforms.map(|transform| transform.inverse());
+                self.systems.insert("camera".to_owned(), systems);
+                let params = Params::new("camera", name, span, params, &[]);
+                self.options.set_camera(&mut self.cx, params, camera_from_world.inverse());
+            }
+            Entity::Film => {
+                self.only_before_world("Film", span);
+                let params = Params::new("film", name, span, params, &[]);
+                self.options.set_film(&mut self.cx, params, self.state.color_space);
+            }
+            Entity::PixelFilter => self.option(entity, "PixelFilter", Params::new("pixel filter", name, span, params, &[])),
+            Entity::Sampler => self.option(entity, "Sampler", Params::new("sampler", name, span, params, &[])),
+            Entity::Integrator => self.option(entity, "Integrator", Params::new("integrator", name, span, params, &[])),
+            // How rays find shapes is Embree's.
+            Entity::Accelerator => self.only_before_world("Accelerator", span),
+        }
+    }
+
+    fn option(&mut self, entity: Entity, name: &str, params: Params) {
+        self.only_before_world(name, params.span);
+        self.options.set_other(&mut self.cx, entity, params);
+    }
+
+    fn attribute(&mut self, target: &str, params: Vec<super::param::Param>, span: Span) {
+        let attributes = Arc::make_mut(&mut self.state.attributes);
+        let Some(list) = attributes.target(target) else {
+            self.cx.unknown_type("target of Attribute", target, span, &Attributes::TARGETS);
+            return;
+        };
+        for mut param in params {
+            param.inherited = true;
+            list.retain(|p| p.name != param.name);
+            list.push(param);
+        }
+    }
+
+    fn shape(&mut self, mut params: Params) {
+        let span = params.span;
+        let world_from_shape = self.placed("shape", span);
+        let kind = shapes::build(&mut self.cx, &mut params);
+        let alpha = shapes::alpha(&mut self.cx, &mut params);
+        params.finish(&mut self.cx);
+        let mut area_light = self.state.area_light.map(AreaLightId);
+        if self.open_object.is_some() && area_light.take().is_some() {
+            let text = "shapes of objects do not shine: this one is drawn without its area light, as in pbrt";
+            self.cx.report.warning("area light in object", span, text);
+        }
+        let Some(kind) = kind else { return };
+        let shape = Shape {
+            world_from_shape,
+            reverse_orientation: self.state.reverse_orientation,
+            kind,
+            material: MaterialId(self.state.material),
+            area_light,
+            alpha,
+            media: self.state.media,
+            span,
+        };
+        match self.open_object {
+            Some(object) => self.world.objects[object].shapes.push(shape),
+            None => self.world.shapes.push(shape),
+        }
+    }
+
+    fn include(&mut self, name: &str, span: Span) {
+        let path = self.cx.files.resolve(name, span.file);
+        // Two names of one file are the same file.
+        let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if self.open_files.contains(&identity) || self.open_files.len() == DEEPEST_INCLUDE {
+            let why = if self.open_files.contains(&identity) { "includes itself" } else { "is included too deep" };
+            self.cx.report.error(span, format!("{} {why}", path.display()));
+            return;
+        }
+        self.includes += 1;
+        if self.includes > MOST_INCLUDES {
+            if self.includes == MOST_INCLUDES + 1 {
+                self.cx.report.error(span, format!("more than {MOST_INCLUDES} files are included"));
+            }
+            return;
+        }
+        match read_file(&path) {
+            Ok(text) => {
+                self.open_files.push(identity);
+                self.read_text(&path, text, Some(span));
+                self.open_files.pop();
+            }
+            Err(why) => self.cx.report.error(span, format!("{}: {why}", path.display())),
+        }
+    }
+
+    /// As `include`, except that what the file changes of the state ends with it.
+    fn import(&mut self, name: &str, span: Span) {
+        self.only_in_world("Import", span);
+        let state = self.state.clone();
+        let systems = self.systems.clone();
+        // The file may not end what it did not begin.
+        let stack = std::mem::take(&mut self.stack);
+        let open_object = self.open_object;
+        self.include(name, span);
+        (self.state, self.systems, self.stack, self.open_object) = (state, systems, stack, open_object);
+    }
+}
