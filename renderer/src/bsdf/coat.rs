@@ -90,9 +90,8 @@ impl CoatRow {
         };
         let crossing = |w: Vec3| attenuation(thickness, w.z);
         let reflected = CosineTable::new(|mu| mean(Self::STRATA, mu, eta, &|s| s.reflected.map_or(0.0, |r| r.1)));
-        let transmitted = CosineTable::new(|mu| {
-            mean(Self::STRATA, mu, eta, &|s| s.transmitted.map_or(0.0, |t| t.1 * crossing(t.0)))
-        });
+        let transmitted =
+            CosineTable::new(|mu| mean(Self::STRATA, mu, eta, &|s| s.transmitted.map_or(0.0, |t| t.1 * crossing(t.0))));
         let internal = (0..Self::COSINES)
             .map(|i| {
                 // Uniform in μ²: cosine-weighted.

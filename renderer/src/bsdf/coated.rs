@@ -202,10 +202,8 @@ impl<'w> CoatedConductor<'w> {
         let transmitted = self.coat.transmitted(cos_o);
         let diffused_energy = self.table.diffused(self.position, cos_o);
         let coat = self.coat.reflected(cos_o);
-        let single =
-            self.reflectance * self.echoed.max_element() * self.table.single(self.position, cos_o);
-        let diffused =
-            diffused_energy * self.diffused.max_element() * self.table.diffused_mean(self.position);
+        let single = self.reflectance * self.echoed.max_element() * self.table.single(self.position, cos_o);
+        let diffused = diffused_energy * self.diffused.max_element() * self.table.diffused_mean(self.position);
         let sum = coat + single + diffused;
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         Choice {
@@ -232,8 +230,7 @@ impl<'w> CoatedConductor<'w> {
         let (coat, coat_pdf) = CoatLobe::eval_pdf(&self.coat, wo, wi);
         let (single, single_pdf) = self.single_bounce(wo, wi, choice);
         let cosine = wi.z * FRAC_1_PI;
-        let diffused =
-            self.diffused * (choice.diffused_energy * self.table.diffused(self.position, wi.z) * cosine);
+        let diffused = self.diffused * (choice.diffused_energy * self.table.diffused(self.position, wi.z) * cosine);
         let pdf = choice.coat * coat_pdf + choice.single * single_pdf + choice.diffused * cosine;
         (single + diffused + coat, pdf)
     }
@@ -248,10 +245,7 @@ impl<'w> CoatedConductor<'w> {
         let solid_angle = wi.z / (eta * eta * i.z);
         let gain = choice.gain * self.table.gain(self.position, wi.z);
         let through = choice.transmitted * self.coat.transmitted(wi.z) * gain;
-        (
-            self.fresnel.at(lobe.cos_d) * self.echoed * (through * lobe.value * solid_angle),
-            lobe.pdf * solid_angle,
-        )
+        (self.fresnel.at(lobe.cos_d) * self.echoed * (through * lobe.value * solid_angle), lobe.pdf * solid_angle)
     }
 
     #[inline]
@@ -287,8 +281,8 @@ impl<'w> CoatedConductor<'w> {
             return self.mirror_reflectance(mu);
         }
         let single = self.echoed * self.table.single(self.position, mu);
-        let diffused = self.diffused
-            * (self.table.diffused(self.position, mu) * self.table.diffused_mean(self.position));
+        let diffused =
+            self.diffused * (self.table.diffused(self.position, mu) * self.table.diffused_mean(self.position));
         self.fresnel.at(mu) * single + diffused + self.coat.reflected(mu)
     }
 }

@@ -96,11 +96,7 @@ impl Dielectric {
         let interface = dielectric(cos_o, eta);
         let reflected = u_lobe < interface.reflectance;
         let probability = if reflected { interface.reflectance } else { 1.0 - interface.reflectance };
-        let wi = if reflected {
-            super::fresnel::reflect(up, m)
-        } else {
-            refract(up, m, cos_o, interface.cos_t, eta)
-        };
+        let wi = if reflected { super::fresnel::reflect(up, m) } else { refract(up, m, cos_o, interface.cos_t, eta) };
         if reflected == (wi.z <= 0.0) || wi.z == 0.0 {
             return None;
         }
@@ -109,11 +105,8 @@ impl Dielectric {
             (scale, probability)
         } else {
             let so = self.ggx.stretch(up);
-            let density = if reflected {
-                0.5 * self.ggx.d(m) / (up.z + so)
-            } else {
-                self.refraction_density(up, wi, m, eta).1
-            };
+            let density =
+                if reflected { 0.5 * self.ggx.d(m) / (up.z + so) } else { self.refraction_density(up, wi, m, eta).1 };
             (scale * self.visible_fraction(up, wi, so), probability * density)
         };
         // The product may underflow far from the peak: such a direction cannot be told from an impossible one.

@@ -77,8 +77,7 @@ impl Axis {
     pub fn locate(&self, alpha: f32) -> Position {
         let above = self.0.iter().position(|&node| node > alpha).unwrap_or(self.0.len());
         let Some(index) = above.checked_sub(1) else { return Position::default() };
-        let fraction =
-            self.0.get(above).map_or(0.0, |&next| (alpha - self.0[index]) / (next - self.0[index]));
+        let fraction = self.0.get(above).map_or(0.0, |&next| (alpha - self.0[index]) / (next - self.0[index]));
         Position { index: index as u32, fraction }
     }
 }
@@ -108,7 +107,8 @@ mod tests {
     fn an_axis_locates_and_clamps() {
         let axis = Axis::textured(&[0.0, 0.1, 0.5]);
         let rows = [0.0, 1.0, 2.0];
-        for (alpha, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.05, 0.5), (0.1, 1.0), (0.3, 1.5), (0.5, 2.0), (3.0, 2.0)] {
+        for (alpha, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.05, 0.5), (0.1, 1.0), (0.3, 1.5), (0.5, 2.0), (3.0, 2.0)]
+        {
             assert!((blend(&rows, axis.locate(alpha), |&x| x) - expected).abs() < 1e-6, "{alpha}");
         }
         let axis = Axis::constant(0.05);

@@ -16,7 +16,8 @@ pub(super) fn build(cx: &mut Context, params: &mut Params, world_from_camera: Tr
     let close = params.float(cx, "shutterclose", 1.0);
     let mut exposure_time = close - open;
     if exposure_time <= 0.0 {
-        cx.report.error(params.span, format!("the shutter opens at {open} and closes at {close}: nothing would be seen"));
+        cx.report
+            .error(params.span, format!("the shutter opens at {open} and closes at {close}: nothing would be seen"));
         exposure_time = 1.0;
     }
     let mut camera = Camera {
@@ -25,9 +26,7 @@ pub(super) fn build(cx: &mut Context, params: &mut Params, world_from_camera: Tr
         lens_radius: params.float_where(cx, "lensradius", 0.0, "at least 0", |radius| radius >= 0.0),
         focal_distance: params.positive(cx, "focaldistance", 1e6),
         screen_window: params.float4(cx, "screenwindow"),
-        frame_aspect_ratio: params
-            .has("frameaspectratio")
-            .then(|| params.positive(cx, "frameaspectratio", 1.0)),
+        frame_aspect_ratio: params.has("frameaspectratio").then(|| params.positive(cx, "frameaspectratio", 1.0)),
         span: params.span,
     };
     if camera.screen_window.is_some_and(|[x0, x1, y0, y1]| x0 == x1 || y0 == y1) {

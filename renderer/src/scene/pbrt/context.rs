@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
+use super::interim as spectrum;
 use super::report::{Report, did_you_mean, shown};
 use super::source::Files;
 use super::spectra;
 use super::textures::{self, TextureTable, TextureValues};
 use crate::scene::Span;
 use crate::scene::description::TextureId;
-use crate::spectrum::{self, Spectrum};
+use crate::spectrum::Spectrum;
 
 /// Numbers for names, in the order in which they were first said. What a name stands for is found out at the end, since
 /// a file may use a name before it defines it.

@@ -6,7 +6,7 @@ use glam::Mat3;
 
 use super::context::Context;
 use super::params::Params;
-use super::spectra::{self, ColorSpace};
+use super::spectra::ColorSpace;
 use crate::scene::description::Film;
 
 const TYPES: [&str; 3] = ["rgb", "gbuffer", "spectral"];
@@ -101,13 +101,13 @@ fn sensor(cx: &mut Context, params: &mut Params, exposure_time: f32) -> Mat3 {
         kelvin == 0.0 || (1000.0..=40000.0).contains(&kelvin)
     });
     let name = params.string(cx, "sensor").unwrap_or_else(|| "cie1931".to_owned());
-    let mut balance = if white > 0.0 { spectra::white_balance(white) } else { Mat3::IDENTITY };
+    let mut balance = if white > 0.0 { super::interim::white_balance(white) } else { Mat3::IDENTITY };
     if name != "cie1931" {
         let text = format!("the response of the sensor \"{name}\" is not simulated: the CIE 1931 observer is used");
         cx.report.warning("sensor", params.span_of("sensor"), text);
         if white == 0.0 {
             // What pbrt assumes for real sensors.
-            balance = spectra::white_balance(6500.0);
+            balance = super::interim::white_balance(6500.0);
         }
     }
     balance * (exposure_time * iso / 100.0)

@@ -43,7 +43,8 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
 
     let mut shapes = world.shapes;
     shapes.iter_mut().for_each(|shape| resolver.resolve(&mut cx, shape));
-    let (objects, instances) = objects(&mut cx, world.objects, world.object_names.into_said(), world.instances, &resolver);
+    let (objects, instances) =
+        objects(&mut cx, world.objects, world.object_names.into_said(), world.instances, &resolver);
 
     let textures = textures::take_built(&mut cx);
     let Context { report, files, .. } = cx;

@@ -13,6 +13,7 @@ mod camera;
 mod context;
 mod film;
 mod finish;
+mod interim;
 mod lexer;
 mod lights;
 mod materials;

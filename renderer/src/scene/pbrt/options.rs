@@ -62,7 +62,11 @@ impl Options {
             }
         } else if let Some((_, instead)) = NOT_FOLLOWED.iter().find(|(known, _)| *known == name) {
             if value != "false" {
-                cx.report.warning(format!("option {name}"), span, format!("option \"{name}\" is not followed: {instead}"));
+                cx.report.warning(
+                    format!("option {name}"),
+                    span,
+                    format!("option \"{name}\" is not followed: {instead}"),
+                );
             }
         } else if !WITHOUT_EFFECT.contains(&name.as_str()) {
             let known = WITHOUT_EFFECT.into_iter().chain(NOT_FOLLOWED.iter().map(|(known, _)| *known)).chain(["seed"]);
@@ -102,8 +106,7 @@ impl Options {
         let (camera, exposure_time) = camera::build(cx, &mut params, world_from_camera);
         let (mut params, space) = self.film.unwrap_or_else(|| (none("film", "rgb"), ColorSpace::Srgb));
         let film = film::build(cx, &mut params, space, exposure_time);
-        let filter =
-            sampling::filter(cx, &mut self.filter.unwrap_or_else(|| none("pixel filter", "gaussian")));
+        let filter = sampling::filter(cx, &mut self.filter.unwrap_or_else(|| none("pixel filter", "gaussian")));
         let (spp, seed) = sampling::sampler(cx, &mut self.sampler.unwrap_or_else(|| none("sampler", "zsobol")));
         let integrator =
             sampling::integrator(cx, &mut self.integrator.unwrap_or_else(|| none("integrator", "volpath")));

@@ -1,9 +1,9 @@
 //! One parameter of a directive: `"type name" values`, as the file gives it.
 
-use super::spectra::ColorSpace;
 use super::lexer::{Kind, NotANumber, Token, parse_f32, parse_i32};
 use super::report::{did_you_mean, shown};
 use super::source::{Cursor, Fault};
+use super::spectra::ColorSpace;
 use crate::scene::Span;
 
 /// The declared type of a parameter.
@@ -123,7 +123,9 @@ fn declaration(cursor: &mut Cursor<'_, '_>, token: Token) -> Result<(ParamType, 
         return Err(cursor.fault(span, format!("expected a parameter as \"type name\", found \"{}\"", quote())));
     };
     if rest.is_some() {
-        return Err(cursor.fault(span, format!("expected a parameter as \"type name\", found more words in \"{}\"", quote())));
+        return Err(
+            cursor.fault(span, format!("expected a parameter as \"type name\", found more words in \"{}\"", quote()))
+        );
     }
     let Some(kind) = ParamType::from_name(type_name) else {
         let hint = did_you_mean(type_name, ParamType::NAMES.iter().map(|(name, _)| *name));

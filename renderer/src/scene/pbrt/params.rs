@@ -8,9 +8,10 @@ use std::path::PathBuf;
 use glam::{Vec2, Vec3};
 
 use super::context::Context;
-use super::spectra::{self, Usage};
+use super::interim::Interim;
 use super::param::{Param, ParamType, Values};
 use super::report::{did_you_mean, shown};
+use super::spectra::{self, Usage};
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{TextureId, Value};
@@ -218,12 +219,7 @@ impl Params {
     }
 
     /// One of the words of `choices`, and the first of them where none is given.
-    pub(super) fn choice<T: Copy>(
-        &mut self,
-        cx: &mut Context,
-        name: &'static str,
-        choices: &[(&'static str, T)],
-    ) -> T {
+    pub(super) fn choice<T: Copy>(&mut self, cx: &mut Context, name: &'static str, choices: &[(&'static str, T)]) -> T {
         let default = choices[0].1;
         let Some(word) = self.string(cx, name) else { return default };
         match choices.iter().find(|(known, _)| known.eq_ignore_ascii_case(&word)) {
@@ -329,12 +325,7 @@ impl Params {
     }
 
     /// A spectrum as linear Rec.709 RGB, or a texture.
-    pub(super) fn opt_rgb_texture(
-        &mut self,
-        cx: &mut Context,
-        name: &'static str,
-        usage: Usage,
-    ) -> Option<Value<Rgb>> {
+    pub(super) fn opt_rgb_texture(&mut self, cx: &mut Context, name: &'static str, usage: Usage) -> Option<Value<Rgb>> {
         match self.given(cx, name, usage, &SPECTRAL)? {
             Given::Spectrum(spectrum) => Some(Value::Constant(self.checked(cx, name, usage, &spectrum))),
             Given::Texture(texture) => cx.spectrum_texture(&texture, self.span_of(name)).map(Value::Texture),
@@ -353,11 +344,7 @@ impl Params {
     }
 
     /// A spectrum as it stands, or a texture.
-    pub(super) fn opt_spectrum_texture(
-        &mut self,
-        cx: &mut Context,
-        name: &'static str,
-    ) -> Option<Value<Spectrum>> {
+    pub(super) fn opt_spectrum_texture(&mut self, cx: &mut Context, name: &'static str) -> Option<Value<Spectrum>> {
         match self.given(cx, name, Usage::Unbounded, &SPECTRAL)? {
             Given::Spectrum(spectrum) => Some(Value::Constant(spectrum)),
             Given::Texture(texture) => cx.spectrum_texture(&texture, self.span_of(name)).map(Value::Texture),
@@ -390,13 +377,7 @@ impl Params {
     }
 
     /// The spectrum or texture that `name` gives, read and converted to Rec.709 but not judged.
-    fn given(
-        &mut self,
-        cx: &mut Context,
-        name: &'static str,
-        usage: Usage,
-        kinds: &[ParamType],
-    ) -> Option<Given> {
+    fn given(&mut self, cx: &mut Context, name: &'static str, usage: Usage, kinds: &[ParamType]) -> Option<Given> {
         let param = self.find(cx, name, kinds)?;
         let (span, color_space, kind) = (param.span, param.color_space, param.kind);
         match &param.values {

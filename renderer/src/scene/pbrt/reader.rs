@@ -1,6 +1,6 @@
 //! The state machine of a scene file: what each directive does to the state, and what it adds to the scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use super::lexer::Lexer;
 use super::materials::{MaterialEntity, MaterialTable};
 use super::media;
 use super::options::Options;
+use super::param::Param;
 use super::params::Params;
 use super::report::{did_you_mean, shown};
 use super::shapes;
@@ -87,6 +88,8 @@ pub(super) struct Reader {
     systems: CoordinateSystems,
     /// The numbers of named materials in `world.material_refs`.
     named_materials: BTreeMap<String, u32>,
+    /// The objects that were defined.
+    object_names: HashSet<String>,
     /// Index of the object that is being defined.
     open_object: Option<usize>,
     /// The files that are being read, innermost last.
@@ -117,6 +120,7 @@ impl Reader {
             stack: Vec::new(),
             systems: CoordinateSystems::new(),
             named_materials: BTreeMap::new(),
+            object_names: HashSet::new(),
             open_object: None,
             open_files: Vec::new(),
             includes: 0,
@@ -125,7 +129,7 @@ impl Reader {
 
     /// Reads the text of a scene and everything that it includes.
     pub(super) fn read(&mut self, path: &Path, text: Vec<u8>) {
-        self.open_files.push(path.to_owned());
+        self.open_files.push(path.canonicalize().unwrap_or_else(|_| path.to_owned()));
         self.read_text(path, text, None);
         self.open_files.pop();
         if !self.in_world {
@@ -329,7 +333,7 @@ impl Reader {
             self.cx.report.error(span, "ObjectBegin within an object");
             return;
         }
-        if self.world.objects.iter().any(|object| *object.name == *name) {
+        if !self.object_names.insert(name.clone()) {
             self.cx.report.error(span, format!("there is already an object \"{}\"", shown(&name)));
         }
         self.open_object = Some(self.world.objects.len());
@@ -396,10 +400,8 @@ impl Reader {
         }
     }
 
-    fn entity(&mut self, entity: Entity, name: String, params: Vec<super::param::Param>, span: Span) {
+    fn entity(&mut self, entity: Entity, name: String, params: Vec<Param>, span: Span) {
         let attributes = Arc::clone(&self.state.attributes);
-        let with = |what, inherited| Params::new(what, name.clone(), span, params.clone(), inherited);
-        let _ = &with;
         match entity {
             Entity::Shape => {
                 self.only_in_world("Shape", span);
@@ -454,7 +456,9 @@ impl Reader {
                 let params = Params::new("film", name, span, params, &[]);
                 self.options.set_film(&mut self.cx, params, self.state.color_space);
             }
-            Entity::PixelFilter => self.option(entity, "PixelFilter", Params::new("pixel filter", name, span, params, &[])),
+            Entity::PixelFilter => {
+                self.option(entity, "PixelFilter", Params::new("pixel filter", name, span, params, &[]))
+            }
             Entity::Sampler => self.option(entity, "Sampler", Params::new("sampler", name, span, params, &[])),
             Entity::Integrator => self.option(entity, "Integrator", Params::new("integrator", name, span, params, &[])),
             // How rays find shapes is Embree's.
@@ -467,7 +471,7 @@ impl Reader {
         self.options.set_other(&mut self.cx, entity, params);
     }
 
-    fn attribute(&mut self, target: &str, params: Vec<super::param::Param>, span: Span) {
+    fn attribute(&mut self, target: &str, params: Vec<Param>, span: Span) {
         let attributes = Arc::make_mut(&mut self.state.attributes);
         let Some(list) = attributes.target(target) else {
             self.cx.unknown_type("target of Attribute", target, span, &Attributes::TARGETS);

@@ -25,7 +25,8 @@ pub(super) fn filter(cx: &mut Context, params: &mut Params) -> PixelFilter {
         }
     };
     // A filter is sampled over its support: beyond this it would be a blur of the whole picture.
-    let mut side = |name| params.float_where(cx, name, radius, "more than 0 and at most 100", |r| r > 0.0 && r <= 100.0);
+    let mut side =
+        |name| params.float_where(cx, name, radius, "more than 0 and at most 100", |r| r > 0.0 && r <= 100.0);
     let radius = Vec2::new(side("xradius"), side("yradius"));
     params.finish(cx);
     PixelFilter { radius, kind }

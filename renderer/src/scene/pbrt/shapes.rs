@@ -201,7 +201,8 @@ fn curve(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
     let normals = match kind {
         CurveKind::Ribbon if normals.len() == control.len() + 1 => normals,
         CurveKind::Ribbon => {
-            let text = format!("a ribbon of {} segments needs {0} + 1 normals \"N\", not {}", control.len(), normals.len());
+            let text =
+                format!("a ribbon of {} segments needs {0} + 1 normals \"N\", not {}", control.len(), normals.len());
             cx.report.error(params.span_of("N"), text);
             return None;
         }
@@ -239,12 +240,8 @@ mod tests {
     /// The uniform cubic B-spline in matrix form at parameter `t` of a segment.
     fn b_spline(p: [Vec3; 4], t: f32) -> Vec3 {
         let s = 1.0 - t;
-        let weights = [
-            s * s * s,
-            3.0 * t * t * t - 6.0 * t * t + 4.0,
-            -3.0 * t * t * t + 3.0 * t * t + 3.0 * t + 1.0,
-            t * t * t,
-        ];
+        let weights =
+            [s * s * s, 3.0 * t * t * t - 6.0 * t * t + 4.0, -3.0 * t * t * t + 3.0 * t * t + 3.0 * t + 1.0, t * t * t];
         p.iter().zip(weights).map(|(p, w)| *p * (w / 6.0)).sum()
     }
 

@@ -6,9 +6,9 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::syntax::DIRECTIVES;
 use super::lexer::{Kind, Lexer, NotANumber, Token, parse_f64};
 use super::report::{Report, shown};
+use super::syntax::DIRECTIVES;
 use crate::scene::{SourceMap, Span};
 
 /// Something was wrong and has been reported: go on with the next directive.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::interim::Interim;
 use super::source::read_file;
 use crate::math::Rgb;
 use crate::spectrum::Spectrum;

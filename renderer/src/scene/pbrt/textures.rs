@@ -216,9 +216,7 @@ fn build(cx: &mut Context, entity: &mut TextureEntity) -> Option<TextureKind> {
             inside: value(cx, params, "inside", values, 1.0),
             outside: value(cx, params, "outside", values, 0.0),
         },
-        "fbm" => {
-            TextureKind::Fbm { texture_from_world, octaves: octaves(cx, params), omega: omega(cx, params) }
-        }
+        "fbm" => TextureKind::Fbm { texture_from_world, octaves: octaves(cx, params), omega: omega(cx, params) },
         "wrinkled" => {
             TextureKind::Wrinkled { texture_from_world, octaves: octaves(cx, params), omega: omega(cx, params) }
         }
