@@ -226,7 +226,7 @@ pub enum TextureKind {
         /// Unit, world space.
         dir: Vec3,
     },
-    /// Bilinear interpolation over (u, v) of four corners 00 01 10 11, index = vu.
+    /// Bilinear interpolation over (u, v) of four corners 00 01 10 11, index = vu: the second is that of u = 1, v = 0.
     Bilerp {
         /// Corner values.
         corners: [Rgb; 4],
@@ -340,7 +340,7 @@ pub struct ImageTexture {
     pub encoding: Option<Encoding>,
     /// Multiplies the value.
     pub scale: f32,
-    /// 1 − value (before the scale), not below 0.
+    /// 1 − scaled value, not below 0.
     pub invert: bool,
     /// A float texture: the mean of the channels rather than RGB.
     pub monochrome: bool,
@@ -512,8 +512,9 @@ pub struct Light {
     pub span: Span,
 }
 
-/// Kinds of lights. Intensities in W/sr, radiances in W/(sr m²), irradiances in W/m², in film RGB; where the file gives a
-/// power or an illuminance instead, `power` or `illuminance` holds it and the level of the other is only its hue.
+/// Kinds of lights. Intensities in W/sr, radiances in W/(sr m²), irradiances in W/m², in film RGB. Where the file gives a
+/// power or an illuminance too, `power` or `illuminance` holds it: that is the one of an emission of luminance 1, and the
+/// level of the other still multiplies it, as in pbrt.
 #[derive(Clone, Debug)]
 pub enum LightKind {
     /// The same in all directions.

@@ -3,14 +3,13 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
-use super::interim as spectrum;
 use super::report::{Report, did_you_mean, shown};
 use super::source::Files;
 use super::spectra;
 use super::textures::{self, TextureTable, TextureValues};
 use crate::scene::Span;
 use crate::scene::description::TextureId;
-use crate::spectrum::Spectrum;
+use crate::spectrum::{self, Spectrum};
 
 /// Numbers for names, in the order in which they were first said. What a name stands for is found out at the end, since
 /// a file may use a name before it defines it.
@@ -104,7 +103,8 @@ impl Context {
                 None
             }
             Err(_) => {
-                let hint = did_you_mean(name, spectrum::names());
+                let known: Vec<String> = spectrum::names().collect();
+                let hint = did_you_mean(name, known.iter().map(String::as_str));
                 let text = format!("\"{}\" is neither a known spectrum nor a file{hint}", shown(name));
                 self.report.error(span, text);
                 None

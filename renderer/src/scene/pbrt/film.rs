@@ -6,8 +6,8 @@ use glam::Mat3;
 
 use super::context::Context;
 use super::params::Params;
-use super::spectra::ColorSpace;
 use crate::scene::description::Film;
+use crate::spectrum::RgbSpace;
 
 const TYPES: [&str; 3] = ["rgb", "gbuffer", "spectral"];
 
@@ -15,7 +15,7 @@ const TYPES: [&str; 3] = ["rgb", "gbuffer", "spectral"];
 const LARGEST_SIDE: u32 = 1 << 20;
 
 /// Builds the film. `exposure_time` is how long the camera's shutter is open, in seconds.
-pub(super) fn build(cx: &mut Context, params: &mut Params, space: ColorSpace, exposure_time: f32) -> Film {
+pub(super) fn build(cx: &mut Context, params: &mut Params, space: RgbSpace, exposure_time: f32) -> Film {
     let gbuffer = params.name == "gbuffer";
     match params.name.as_str() {
         "rgb" => {}
@@ -37,7 +37,7 @@ pub(super) fn build(cx: &mut Context, params: &mut Params, space: ColorSpace, ex
             params.ignore_all();
         }
     }
-    if !space.is_rec709() {
+    if space != RgbSpace::Srgb {
         let text = "the picture is written in linear Rec.709 RGB, not in the file's colour space";
         cx.report.warning("film colour space", params.span, text);
     }
@@ -101,13 +101,13 @@ fn sensor(cx: &mut Context, params: &mut Params, exposure_time: f32) -> Mat3 {
         kelvin == 0.0 || (1000.0..=40000.0).contains(&kelvin)
     });
     let name = params.string(cx, "sensor").unwrap_or_else(|| "cie1931".to_owned());
-    let mut balance = if white > 0.0 { super::interim::white_balance(white) } else { Mat3::IDENTITY };
+    let mut balance = if white > 0.0 { RgbSpace::Srgb.film_from_rec709(Some(white)) } else { Mat3::IDENTITY };
     if name != "cie1931" {
         let text = format!("the response of the sensor \"{name}\" is not simulated: the CIE 1931 observer is used");
         cx.report.warning("sensor", params.span_of("sensor"), text);
         if white == 0.0 {
             // What pbrt assumes for real sensors.
-            balance = super::interim::white_balance(6500.0);
+            balance = RgbSpace::Srgb.film_from_rec709(Some(6500.0));
         }
     }
     balance * (exposure_time * iso / 100.0)

@@ -3,8 +3,6 @@
 //! pbrt divides the level of every emission spectrum by its photometric luminance, so that the level of a blackbody or
 //! named spectrum is `scale` and that of an RGB its own. [`Usage::Illuminant`] does that.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 
 use super::context::Context;
@@ -69,9 +67,11 @@ fn power(cx: &mut Context, params: &mut Params, name: &'static str) -> Option<f3
 }
 
 fn point(cx: &mut Context, params: &mut Params) -> LightKind {
-    let intensity = level(cx, params, "I");
-    let factor = power(cx, params, "power").map_or(1.0, |power| power / (4.0 * PI));
-    LightKind::Point { intensity: intensity * factor, from: params.point3(cx, "from", Vec3::ZERO), power: None }
+    LightKind::Point {
+        intensity: level(cx, params, "I"),
+        from: params.point3(cx, "from", Vec3::ZERO),
+        power: power(cx, params, "power"),
+    }
 }
 
 /// The ends of a light's axis. `None` if they coincide.
@@ -87,25 +87,16 @@ fn axis(cx: &mut Context, params: &mut Params) -> Option<(Vec3, Vec3)> {
 
 fn spot(cx: &mut Context, params: &mut Params) -> Option<LightKind> {
     let cone_angle = params.float_where(cx, "coneangle", 30.0, "from 0 to 180", |a| (0.0..=180.0).contains(&a));
-    let delta = params.float_where(cx, "conedeltaangle", 5.0, "at least 0", |a| a >= 0.0).min(cone_angle);
-    let (end, start) = (cone_angle.to_radians().cos(), (cone_angle - delta).to_radians().cos());
-    // Power per unit of intensity on the axis: the full cone, and half of the edge, whose falloff averages 1/2.
-    let solid_angle = 2.0 * PI * ((1.0 - start) + (start - end) / 2.0);
-    let factor = power(cx, params, "power").map_or(1.0, |power| power / solid_angle);
-    let intensity = level(cx, params, "I") * factor;
-    let axis = axis(cx, params);
-    if !intensity.is_finite() {
-        cx.report.error(params.span, "the cone of the light has no width, so it cannot have a power");
-        return None;
-    }
-    let (from, to) = axis?;
-    Some(LightKind::Spot { intensity, from, to, cone_angle, cone_delta_angle: delta, power: None })
+    let cone_delta_angle = params.float_where(cx, "conedeltaangle", 5.0, "at least 0", |a| a >= 0.0).min(cone_angle);
+    let (intensity, power) = (level(cx, params, "I"), power(cx, params, "power"));
+    let (from, to) = axis(cx, params)?;
+    Some(LightKind::Spot { intensity, from, to, cone_angle, cone_delta_angle, power })
 }
 
 fn distant(cx: &mut Context, params: &mut Params) -> Option<LightKind> {
-    let radiance = level(cx, params, "L") * power(cx, params, "illuminance").unwrap_or(1.0);
+    let (radiance, illuminance) = (level(cx, params, "L"), power(cx, params, "illuminance"));
     let (from, to) = axis(cx, params)?;
-    Some(LightKind::Distant { radiance, from, to, illuminance: None })
+    Some(LightKind::Distant { radiance, from, to, illuminance })
 }
 
 fn infinite(cx: &mut Context, params: &mut Params) -> LightKind {
@@ -122,23 +113,16 @@ fn infinite(cx: &mut Context, params: &mut Params) -> LightKind {
             cx.report.error(params.span_of("portal"), text);
         }
     }
-    let mut radiance = level(cx, params, "L");
-    let mut illuminance = power(cx, params, "illuminance");
-    if image.is_none() {
-        // A uniform hemisphere of radiance 1 gives an illuminance of π.
-        radiance *= illuminance.take().map_or(1.0, |illuminance| illuminance / PI);
-    }
+    let (radiance, illuminance) = (level(cx, params, "L"), power(cx, params, "illuminance"));
     LightKind::Infinite { radiance, image, illuminance, portal }
 }
 
 fn goniometric(cx: &mut Context, params: &mut Params) -> LightKind {
-    let mut intensity = level(cx, params, "I");
+    let (intensity, power) = (level(cx, params, "I"), power(cx, params, "power"));
     let image = params.path(cx, "filename");
-    let mut power = power(cx, params, "power");
     if image.is_none() {
         let text = "a goniometric light without \"filename\" shines the same in all directions";
         cx.report.warning("goniometric without image", params.span, text);
-        intensity *= power.take().map_or(1.0, |power| power / (4.0 * PI));
     }
     LightKind::Goniometric { intensity, image, power }
 }

@@ -3,14 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::context::Context;
-use super::interim as spectrum;
 use super::params::Params;
 use super::report::{did_you_mean, shown};
 use super::spectra::Usage;
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{Coat, Conductor, Material, MaterialId, MaterialKind, Roughness, TextureKind, Value};
-use crate::spectrum::Spectrum;
+use crate::spectrum::{self, Spectrum};
 
 /// A material as read.
 #[derive(Debug)]

@@ -13,7 +13,6 @@ mod camera;
 mod context;
 mod film;
 mod finish;
-mod interim;
 mod lexer;
 mod lights;
 mod materials;

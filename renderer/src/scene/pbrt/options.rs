@@ -6,17 +6,17 @@ use super::film;
 use super::params::Params;
 use super::report::{did_you_mean, shown};
 use super::sampling;
-use super::spectra::ColorSpace;
 use super::syntax::Entity;
 use crate::math::Transform;
 use crate::scene::Span;
 use crate::scene::description::{Camera, Film, Integrator, PixelFilter};
+use crate::spectrum::RgbSpace;
 
 /// How the picture is taken, as read so far. What is missing has pbrt's defaults.
 #[derive(Default)]
 pub(super) struct Options {
     camera: Option<(Params, Transform)>,
-    film: Option<(Params, ColorSpace)>,
+    film: Option<(Params, RgbSpace)>,
     filter: Option<Params>,
     sampler: Option<Params>,
     integrator: Option<Params>,
@@ -82,7 +82,7 @@ impl Options {
     }
 
     /// `Film`, in the colour space in force.
-    pub(super) fn set_film(&mut self, cx: &mut Context, params: Params, space: ColorSpace) {
+    pub(super) fn set_film(&mut self, cx: &mut Context, params: Params, space: RgbSpace) {
         told_twice(cx, self.film.is_some(), "Film", params.span);
         self.film = Some((params, space));
     }
@@ -104,7 +104,7 @@ impl Options {
         let (mut params, world_from_camera) =
             self.camera.unwrap_or_else(|| (none("camera", "perspective"), Transform::default()));
         let (camera, exposure_time) = camera::build(cx, &mut params, world_from_camera);
-        let (mut params, space) = self.film.unwrap_or_else(|| (none("film", "rgb"), ColorSpace::Srgb));
+        let (mut params, space) = self.film.unwrap_or_else(|| (none("film", "rgb"), RgbSpace::Srgb));
         let film = film::build(cx, &mut params, space, exposure_time);
         let filter = sampling::filter(cx, &mut self.filter.unwrap_or_else(|| none("pixel filter", "gaussian")));
         let (spp, seed) = sampling::sampler(cx, &mut self.sampler.unwrap_or_else(|| none("sampler", "zsobol")));

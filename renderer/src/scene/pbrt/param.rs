@@ -3,8 +3,8 @@
 use super::lexer::{Kind, NotANumber, Token, parse_f32, parse_i32};
 use super::report::{did_you_mean, shown};
 use super::source::{Cursor, Fault};
-use super::spectra::ColorSpace;
 use crate::scene::Span;
+use crate::spectrum::RgbSpace;
 
 /// The declared type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,7 +83,7 @@ pub(super) struct Param {
     /// Of the declaration, the part in quotes.
     pub(super) span: Span,
     /// In which the file's RGB values of this parameter are.
-    pub(super) color_space: ColorSpace,
+    pub(super) color_space: RgbSpace,
     /// Given by `Attribute` for whoever knows it, so nobody needs to.
     pub(super) inherited: bool,
     /// Somebody asked for it.
@@ -91,7 +91,7 @@ pub(super) struct Param {
 }
 
 /// Reads the parameters that follow a directive. What is wrong with one is reported and leaves that one out.
-pub(super) fn read_params(cursor: &mut Cursor<'_, '_>, color_space: ColorSpace) -> Vec<Param> {
+pub(super) fn read_params(cursor: &mut Cursor<'_, '_>, color_space: RgbSpace) -> Vec<Param> {
     let mut params: Vec<Param> = Vec::new();
     while let Some(token) = cursor.peek().filter(|t| matches!(t.kind, Kind::Quoted | Kind::Unterminated)) {
         cursor.advance();

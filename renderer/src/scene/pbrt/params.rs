@@ -8,14 +8,13 @@ use std::path::PathBuf;
 use glam::{Vec2, Vec3};
 
 use super::context::Context;
-use super::interim::Interim;
 use super::param::{Param, ParamType, Values};
 use super::report::{did_you_mean, shown};
 use super::spectra::{self, Usage};
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{TextureId, Value};
-use crate::spectrum::Spectrum;
+use crate::spectrum::{RgbSpace, Spectrum};
 
 /// Parameters of one directive.
 #[derive(Clone, Debug)]
@@ -351,7 +350,7 @@ impl Params {
         }
     }
 
-    /// A refractive index: a number, or a spectrum, of which the value at the sodium line counts.
+    /// A refractive index: a number, or a spectrum, of which the value at the d line counts.
     pub(super) fn eta(&mut self, cx: &mut Context, name: &'static str, default: f32) -> f32 {
         let is_float = self.list.iter().any(|p| &*p.name == name && p.kind == ParamType::Float);
         let eta = if is_float {
@@ -361,10 +360,11 @@ impl Params {
             match self.given(cx, name, Usage::Unbounded, &kinds) {
                 Some(Given::Spectrum(spectrum)) => {
                     if spectra::varies(&spectrum) {
-                        let text = "dispersion is not rendered: the refractive index at 589 nm is used for all colours";
+                        let text =
+                            "dispersion is not rendered: the refractive index at 587.6 nm is used for all colours";
                         cx.report.warning("dispersion", self.span_of(name), text);
                     }
-                    spectrum.at(spectra::SODIUM_LINE)
+                    spectrum.refractive_index()
                 }
                 _ => default,
             }
@@ -393,9 +393,11 @@ impl Params {
                 let values = values.clone();
                 self.only_one(cx, name, if kind == ParamType::Spectrum { 1 } else { values.len() / kind.size() });
                 match kind {
-                    ParamType::Rgb => {
-                        Some(Given::Spectrum(Spectrum::Rgb(color_space.to_rec709(Rgb::from_slice(&values), usage))))
-                    }
+                    ParamType::Rgb => Some(Given::Spectrum(Spectrum::Rgb(spectra::to_rec709(
+                        color_space,
+                        Rgb::from_slice(&values),
+                        usage,
+                    )))),
                     ParamType::Blackbody if values[0] > 0.0 => Some(Given::Spectrum(Spectrum::Blackbody(values[0]))),
                     ParamType::Blackbody => {
                         cx.report.error(span, format!("a temperature must be more than 0 K, not {}", values[0]));
@@ -421,7 +423,7 @@ impl Params {
         let mut kept = rgb;
         if !rgb.is_finite() || (given_rgb && rgb.min_element() < 0.0) {
             // A colour of a wider space may lie outside Rec.709: that is the conversion's, not the file's.
-            let own = self.list.iter().find(|p| &*p.name == name).is_none_or(|p| p.color_space.is_rec709());
+            let own = self.list.iter().find(|p| &*p.name == name).is_none_or(|p| p.color_space == RgbSpace::Srgb);
             if own || !rgb.is_finite() {
                 cx.report.error(self.span_of(name), format!("\"{name}\" must not be negative"));
             } else {

@@ -14,13 +14,14 @@ use super::params::Params;
 use super::report::{did_you_mean, shown};
 use super::shapes;
 use super::source::{Cursor, read_file};
-use super::spectra::ColorSpace;
+use super::spectra::SPACES;
 use super::state::{self, Attributes, CoordinateSystems, State, Transforms};
 use super::syntax::{Directive, Entity, read_directive};
 use super::textures::{TextureEntity, TextureTable, TextureValues};
 use crate::math::Transform;
 use crate::scene::Span;
 use crate::scene::description::{AreaLightId, MaterialId, Medium, MediumId, Shape};
+use crate::spectrum::RgbSpace;
 
 /// Files within files beyond this include themselves or are not meant to be read.
 const DEEPEST_INCLUDE: usize = 64;
@@ -200,7 +201,7 @@ impl Reader {
                 None => self.cx.report.error(span, "the matrix has no inverse"),
             },
             // The times between which a shape moves: motion is not rendered, and is warned of where it happens.
-            Directive::TransformTimes(_) => self.only_before_world("TransformTimes", span),
+            Directive::TransformTimes => self.only_before_world("TransformTimes", span),
             Directive::ActiveTransform(active) => self.state.active = active,
             Directive::CoordinateSystem(name) => {
                 self.systems.insert(name, self.state.transforms);
@@ -271,12 +272,9 @@ impl Reader {
     }
 
     fn color_space(&mut self, name: &str, span: Span) {
-        match ColorSpace::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
-            Some(&(_, space)) => self.state.color_space = space,
-            None => {
-                let known: Vec<&str> = ColorSpace::NAMES.iter().map(|&(known, _)| known).collect();
-                self.cx.unknown_type("colour space", name, span, &known);
-            }
+        match RgbSpace::named(name) {
+            Some(space) => self.state.color_space = space,
+            None => self.cx.unknown_type("colour space", name, span, &SPACES),
         }
     }
 

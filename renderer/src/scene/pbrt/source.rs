@@ -107,13 +107,6 @@ impl<'t, 'r> Cursor<'t, 'r> {
         self.peeked = None;
     }
 
-    /// Reads the next token.
-    pub(super) fn next(&mut self) -> Option<Token> {
-        let token = self.peek();
-        self.advance();
-        token
-    }
-
     /// Its bytes.
     #[inline]
     pub(super) fn bytes(&self, token: Token) -> &'t [u8] {

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use super::param::Param;
-use super::spectra::ColorSpace;
 use crate::math::Transform;
 use crate::scene::description::MediumId;
+use crate::spectrum::RgbSpace;
 
 /// The current transform at the start and at the end of the shutter.
 pub(super) type Transforms = [Transform; 2];
@@ -20,7 +20,7 @@ pub(super) struct State {
     /// Which of them the transform directives act on.
     pub(super) active: [bool; 2],
     pub(super) reverse_orientation: bool,
-    pub(super) color_space: ColorSpace,
+    pub(super) color_space: RgbSpace,
     /// Index into the reader's table of materials.
     pub(super) material: u32,
     /// Index of the `AreaLightSource` in force.
@@ -37,7 +37,7 @@ impl Default for State {
             transforms: Transforms::default(),
             active: [true, true],
             reverse_orientation: false,
-            color_space: ColorSpace::Srgb,
+            color_space: RgbSpace::Srgb,
             material: 0,
             area_light: None,
             media: [None, None],
@@ -176,8 +176,7 @@ mod tests {
 
     #[test]
     fn only_active_transforms_change() {
-        let mut state = State::default();
-        state.active = [false, true];
+        let mut state = State { active: [false, true], ..State::default() };
         state.concat(translate([1.0, 0.0, 0.0]));
         assert!(state.moves());
         assert_eq!(state.transforms[0].point(Vec3::ZERO), Vec3::ZERO);

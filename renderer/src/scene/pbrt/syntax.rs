@@ -4,8 +4,8 @@ use super::lexer::{Kind, Token};
 use super::param::{Param, read_params};
 use super::report::{did_you_mean, shown};
 use super::source::{Cursor, Fault};
-use super::spectra::ColorSpace;
 use crate::scene::Span;
+use crate::spectrum::RgbSpace;
 
 /// Every directive, and thus every place where reading can go on after an error.
 pub(super) const DIRECTIVES: [&str; 41] = [
@@ -80,7 +80,7 @@ pub(super) enum Directive {
     LookAt([f64; 9]),
     Transform([f64; 16]),
     ConcatTransform([f64; 16]),
-    TransformTimes([f64; 2]),
+    TransformTimes,
     /// Which of start and end the transform directives act on.
     ActiveTransform([bool; 2]),
     CoordinateSystem(String),
@@ -119,7 +119,7 @@ pub(super) enum Directive {
 /// The span covers the directive's word, and its name if it has one.
 pub(super) fn read_directive(
     cursor: &mut Cursor<'_, '_>,
-    color_space: ColorSpace,
+    color_space: RgbSpace,
 ) -> Option<Result<(Directive, Span), Fault>> {
     let token = cursor.peek()?;
     if !cursor.is_directive(token) {
@@ -143,7 +143,7 @@ fn unknown(cursor: &mut Cursor<'_, '_>, token: Token) -> Fault {
     cursor.fault(span, text)
 }
 
-fn arguments(cursor: &mut Cursor<'_, '_>, word: Token, space: ColorSpace) -> Result<(Directive, Span), Fault> {
+fn arguments(cursor: &mut Cursor<'_, '_>, word: Token, space: RgbSpace) -> Result<(Directive, Span), Fault> {
     let mut span = cursor.span(word);
     let mut entity = |cursor: &mut Cursor<'_, '_>, entity| {
         let (name, name_span) = cursor.string("a name")?;
@@ -171,7 +171,10 @@ fn arguments(cursor: &mut Cursor<'_, '_>, word: Token, space: ColorSpace) -> Res
         b"LookAt" => Directive::LookAt(cursor.numbers()?),
         b"Transform" => Directive::Transform(cursor.numbers()?),
         b"ConcatTransform" => Directive::ConcatTransform(cursor.numbers()?),
-        b"TransformTimes" => Directive::TransformTimes(cursor.numbers()?),
+        b"TransformTimes" => {
+            cursor.numbers::<2>()?;
+            Directive::TransformTimes
+        }
         b"ActiveTransform" => Directive::ActiveTransform(active(cursor)?),
         b"CoordinateSystem" => Directive::CoordinateSystem(cursor.string("a name")?.0),
         b"CoordSysTransform" => Directive::CoordSysTransform(cursor.string("a name")?.0),
@@ -271,7 +274,7 @@ mod tests {
         let mut report = Report::default();
         let mut cursor = Cursor::new(Lexer::new(text.as_bytes()), 0, &mut report);
         let mut all = Vec::new();
-        while let Some(directive) = read_directive(&mut cursor, ColorSpace::Srgb) {
+        while let Some(directive) = read_directive(&mut cursor, RgbSpace::Srgb) {
             match directive {
                 Ok((directive, _)) => all.push(directive),
                 Err(_) => cursor.recover(),
@@ -288,7 +291,7 @@ mod tests {
             let mut cursor = Cursor::new(Lexer::new(name.as_bytes()), 0, &mut report);
             let token = cursor.peek().unwrap();
             assert!(cursor.is_directive(token));
-            let _ = read_directive(&mut cursor, ColorSpace::Srgb);
+            let _ = read_directive(&mut cursor, RgbSpace::Srgb);
         }
     }
 

@@ -10,7 +10,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 
 use self::body::{Ascii, Binary, Rows};
-use self::header::{Element, Encoding, Header, Property, Scalar};
+use self::header::{Element, Encoding, Header};
 use super::description::TriangleMesh;
 use super::pbrt::source::read_file;
 

@@ -1,3 +1,4 @@
+use super::header::{Property, Scalar};
 use super::*;
 
 /// A pyramid: a quad and two triangles, with normals, uv and a property nobody knows, as ascii.
