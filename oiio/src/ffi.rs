@@ -47,6 +47,10 @@ pub struct ShimLookup {
     pub anisotropy: i32,
 }
 
+// The same sizes are asserted in shim.cc.
+const _: () = assert!(size_of::<ShimInfo>() == 44 && size_of::<ShimLookup>() == 44);
+const _: () = assert!(size_of::<ShimAttribute>() == 3 * size_of::<usize>() + 8 && size_of::<ShimError>() == 1024);
+
 /// `enum shim_kind`.
 pub mod kind {
     pub const STRING: i32 = 0;

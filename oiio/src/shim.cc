@@ -12,6 +12,10 @@
 
 using namespace OIIO;
 
+// The Rust side asserts the same sizes.
+static_assert(sizeof(shim_info) == 44 && sizeof(shim_lookup) == 44);
+static_assert(sizeof(shim_attribute) == 3 * sizeof(size_t) + 8 && sizeof(shim_error) == 1024);
+
 namespace {
 
 void say(shim_error* error, const std::string& text) {
