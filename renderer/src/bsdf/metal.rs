@@ -8,7 +8,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::coat::{Coat, CoatTable, Split, attenuation};
+use super::coat::{Coat, CoatTable, FACETS, Split, attenuation, facet_points, grazing_limit};
 use super::conductor::Reflection;
 use super::fresnel::dielectric;
 use super::microfacet::Ggx;
@@ -185,25 +185,8 @@ impl MetalRow {
     }
 }
 
-/// Point `i` of the four-dimensional Kronecker sequence of the generalised golden ratio (root of x⁵ = x + 1).
-fn kronecker(i: u32) -> (Vec2, Vec2) {
-    const ROOT: f64 = 1.167_303_978_261_418_7;
-    let x = |power: i32| (0.5 + f64::from(i) * ROOT.powi(-power)).fract() as f32;
-    (Vec2::new(x(1), x(2)), Vec2::new(x(3), x(4)))
-}
-
 /// Intervals of the cosine inside the coat. Finer than outside: all that enters does so within the critical angle.
 const INSIDE_INTERVALS: usize = 128;
-
-/// Points per cosine. Every integrand is smooth but for the onset of total reflection: halving this moves albedos by
-/// less than half a percent.
-const POINTS: u32 = 2048;
-
-/// A direction at cosine `mu`; one in the tangent plane stands for the limit towards it.
-fn grazing_limit(mu: f32) -> Vec3 {
-    let z = mu.max(1e-3);
-    Vec3::new((1.0 - z * z).sqrt(), 0.0, z)
-}
 
 /// Values at multiples of 1/`INSIDE_INTERVALS`, at `mu`.
 fn interpolate(values: &[f32], mu: f32) -> f32 {
@@ -225,58 +208,63 @@ struct Inside {
     diffused: Vec<Vec<f32>>,
 }
 
-/// One way of light from the base to the coat and, in part, back.
-#[derive(Clone, Copy)]
-struct Cycle {
-    /// Fraction that leaves.
-    exit: f32,
-    /// Fraction that arrives at the base again, and at which cosine.
-    back: f32,
-    cosine: f32,
-    total: bool,
+/// Where light goes from one surface to the other: cosines there, and energies.
+struct Ways(Vec<Vec<(f32, f32)>>);
+
+impl Ways {
+    /// From each node of [`INSIDE_INTERVALS`].
+    fn new(from: impl Fn(Vec3) -> Vec<(f32, f32)>) -> Self {
+        Self((0..=INSIDE_INTERVALS).map(|i| from(grazing_limit(i as f32 / INSIDE_INTERVALS as f32))).collect())
+    }
+
+    /// Of a function of the cosine at the other surface, its mean as one of the cosine here.
+    fn mean(&self, values: &[f32]) -> Vec<f32> {
+        let at = |ways: &Vec<(f32, f32)>| ways.iter().map(|&(mu, energy)| energy * interpolate(values, mu)).sum();
+        self.0.iter().map(at).collect()
+    }
 }
 
 impl Inside {
+    /// The facets of either surface are integrated over on their own: between isotropic surfaces light forgets its
+    /// azimuth as far as energies are concerned.
     fn new(coat: &Coat, base: &Ggx) -> Self {
-        let cycles: Vec<Vec<Cycle>> = (0..=INSIDE_INTERVALS)
-            .map(|i| {
-                let w = grazing_limit(i as f32 / INSIDE_INTERVALS as f32);
-                (0..POINTS).filter_map(|k| cycle(coat, base, w, kronecker(k))).collect()
+        let (eta, thickness) = (1.0 / coat.table.eta(), coat.table.thickness());
+        let up = Ways::new(|w| up_from_base(base, w, thickness));
+        let points = facet_points(&coat.ggx, FACETS);
+        let splits = |w: Vec3| points.iter().map(move |&(u, share)| (share, Split::new(&coat.ggx, w, eta, u)));
+        let back = |total_too: bool| {
+            Ways::new(|w| {
+                let kept = splits(w).filter(|(_, split)| total_too || !split.total);
+                let back = kept.filter_map(|(share, split)| Some((share, split.reflected?)));
+                back.map(|(share, (w, energy))| (w.z, share * energy * attenuation(thickness, w.z))).collect()
             })
-            .collect();
-        let step = |f: &dyn Fn(&Cycle) -> f32| -> Vec<f32> {
-            cycles.iter().map(|cycles| cycles.iter().map(f).sum::<f32>() / POINTS as f32).collect()
         };
-        let mut total = step(&|cycle| cycle.exit);
-        let mut direct = vec![total.clone()];
+        let (back_all, back_direct) = (back(true), back(false));
+        let leaving = |w| splits(w).filter_map(|(share, split)| Some(share * split.transmitted?.1)).sum();
+        let exit: Vec<f32> =
+            (0..=INSIDE_INTERVALS).map(|i| leaving(grazing_limit(i as f32 / INSIDE_INTERVALS as f32))).collect();
+
+        let mut all = up.mean(&exit);
+        let mut direct = vec![all.clone()];
         let mut diffused = vec![vec![0.0; INSIDE_INTERVALS + 1]];
         for bounce in 1..BASE_BOUNCES {
-            let previous = &direct[bounce - 1];
-            let kept = step(&|cycle| if cycle.total { 0.0 } else { cycle.back * interpolate(previous, cycle.cosine) });
-            total = step(&|cycle| cycle.back * interpolate(&total, cycle.cosine));
-            diffused.push(total.iter().zip(&kept).map(|(total, kept)| (total - kept).max(0.0)).collect());
+            let kept = up.mean(&back_direct.mean(&direct[bounce - 1]));
+            all = up.mean(&back_all.mean(&all));
+            diffused.push(all.iter().zip(&kept).map(|(all, kept)| (all - kept).max(0.0)).collect());
             direct.push(kept);
         }
         Self { direct, diffused }
     }
 }
 
-/// From `w`, above the base, by one facet of the metal and one of the coat.
-fn cycle(coat: &Coat, base: &Ggx, w: Vec3, (u_base, u_coat): (Vec2, Vec2)) -> Option<Cycle> {
-    let thickness = coat.table.thickness();
-    let (up, mut energy) = if base.is_smooth() {
-        (Vec3::new(-w.x, -w.y, w.z), 1.0)
-    } else {
-        let lobe = Reflection::sample(base, w, u_base)?;
-        (lobe.wi, lobe.value / lobe.pdf)
-    };
-    energy *= attenuation(thickness, up.z);
-    // The coat is met from below: mirrored, its inside is above it. GGX does not mind.
-    let at_coat = Split::new(&coat.ggx, Vec3::new(-up.x, -up.y, up.z), 1.0 / coat.table.eta(), u_coat);
-    let (cosine, fraction) = at_coat.reflected.map_or((0.0, 0.0), |(back, fraction)| (back.z, fraction));
-    let back = if fraction > 0.0 { fraction * attenuation(thickness, cosine) } else { 0.0 };
-    let exit = at_coat.transmitted.map_or(0.0, |transmitted| transmitted.1);
-    Some(Cycle { exit: energy * exit, back: energy * back, cosine, total: at_coat.total })
+/// Where a perfect metal reflects light that comes from `w`, and what of it arrives at the coat.
+fn up_from_base(base: &Ggx, w: Vec3, thickness: f32) -> Vec<(f32, f32)> {
+    if base.is_smooth() {
+        return vec![(w.z, attenuation(thickness, w.z))];
+    }
+    let points = facet_points(base, FACETS);
+    let lobes = points.iter().filter_map(|&(u, share)| Some((share, Reflection::sample(base, w, u)?)));
+    lobes.map(|(share, lobe)| (lobe.wi.z, share * lobe.value / lobe.pdf * attenuation(thickness, lobe.wi.z))).collect()
 }
 
 /// Where light from outside arrives at the base.
@@ -285,15 +273,13 @@ struct Entries(Vec<Vec<(f32, f32)>>);
 impl Entries {
     /// Cosines inside and energies, for each node of a [`CosineTable`].
     fn new(coat: &Coat) -> Self {
-        let points = if coat.ggx.is_smooth() { 1 } else { POINTS };
+        let points = facet_points(&coat.ggx, FACETS);
         let at = |mu: f32| -> Vec<(f32, f32)> {
-            (0..points)
-                .filter_map(|k| {
-                    let split = Split::new(&coat.ggx, grazing_limit(mu), coat.table.eta(), kronecker(k).0);
-                    let (down, energy) = split.transmitted?;
-                    Some((-down.z, energy * attenuation(coat.table.thickness(), down.z) / points as f32))
-                })
-                .collect()
+            let enter = |&(u, share): &(Vec2, f32)| {
+                let (w, energy) = Split::new(&coat.ggx, grazing_limit(mu), coat.table.eta(), u).transmitted?;
+                Some((-w.z, share * energy * attenuation(coat.table.thickness(), w.z)))
+            };
+            points.iter().filter_map(enter).collect()
         };
         Self((0..=CosineTable::INTERVALS).map(|i| at(i as f32 / CosineTable::INTERVALS as f32)).collect())
     }
@@ -314,20 +300,13 @@ struct LobeSamples {
 impl LobeSamples {
     fn new(coat: &Coat, base: &Ggx) -> Self {
         let eta = coat.table.eta();
-        let sample = |wo: Vec3, k: u32| {
-            let w = inside(wo, eta)?;
-            let (up, energy) = if base.is_smooth() {
-                (w, 1.0)
-            } else {
-                let lobe = Reflection::sample(base, w, kronecker(k).1)?;
-                (lobe.wi, lobe.value / lobe.pdf)
-            };
-            let out = inside(up, 1.0 / eta)?;
-            Some((out.z, energy * coat.transmitted(wo.z) * coat.transmitted(out.z) / POINTS as f32))
-        };
-        let at = |i: usize| {
+        let at = |i: usize| -> Vec<(f32, f32)> {
             let wo = grazing_limit(i as f32 / CosineTable::INTERVALS as f32);
-            (0..POINTS).filter_map(|k| sample(wo, k)).collect()
+            let Some(w) = inside(wo, eta) else { return Vec::new() };
+            // Light on its way out is attenuated as part of what the coat transmits.
+            let up = up_from_base(base, w, 0.0);
+            let out = up.iter().filter_map(|&(mu, energy)| Some((inside(grazing_limit(mu), 1.0 / eta)?.z, energy)));
+            out.map(|(mu, energy)| (mu, energy * coat.transmitted(wo.z) * coat.transmitted(mu))).collect()
         };
         Self { samples: (0..=CosineTable::INTERVALS).map(at).collect() }
     }

@@ -49,7 +49,6 @@ fn reference(coat: &Bsdf, base: &Bsdf, wo: LocalDir, n: u32) -> ([Rgb; 6], f32) 
     (sums.map(|sum| (sum / f64::from(n)).as_vec3()), (0.25 / n as f32).sqrt())
 }
 
-const WALKS: u32 = 200_000;
 const COSINES: [f32; 5] = [0.98, 0.8, 0.5, 0.25, 0.1];
 
 #[test]
@@ -58,15 +57,12 @@ fn a_coated_diffuse_base_has_the_walk_s_albedo() {
     for alpha in COATS.alphas() {
         for z in COSINES {
             let wo = direction(z, 0.7);
-            let (parts, error) = reference(&glass(1.5, Vec2::splat(alpha)), &white, wo, WALKS);
+            let (parts, error) = reference(&glass(1.5, Vec2::splat(alpha)), &white, wo, 40_000);
             for albedo in [0.2_f32, 0.5, 0.8, 0.95] {
                 let expected: f32 = parts.iter().enumerate().map(|(n, part)| part.x * albedo.powi(n as i32)).sum();
                 let model = COATS.diffuse(alpha, Rgb::splat(albedo)).albedo(wo).x;
-                println!(
-                    "diffuse alpha {alpha:.2} cos {z:.2} albedo {albedo}: walk {expected:.4} model {model:.4} {:+.2} %",
-                    100.0 * (model / expected - 1.0)
-                );
-                // 100 tests at 0.1 % together: 4.3 standard errors. The tables add at most 0.002.
+                // 100 tests at 0.1 % together: 4.3 standard errors. The model itself is within 0.0015 (measured
+                // with 400 000 walks).
                 assert!((model - expected).abs() < 4.3 * error + 0.002, "{alpha} {z} {albedo}: {expected} {model}");
             }
         }
@@ -81,18 +77,15 @@ fn a_coated_metal_has_the_walk_s_albedo() {
                 let wo = direction(z, 0.7);
                 for (name, fresnel) in [("Al", METAL), ("white", ConductorFresnel::Curve(&PERFECT))] {
                     let bare = metal(Vec2::splat(base), fresnel);
-                    let (parts, error) = reference(&glass(1.5, Vec2::splat(alpha)), &bare, wo, WALKS);
+                    let (parts, error) = reference(&glass(1.5, Vec2::splat(alpha)), &bare, wo, 4_000);
                     let expected: f32 = parts.iter().map(|part| part.z).sum();
                     let bsdf = COATS.metal(alpha, base, fresnel);
-                    let (model, model_error) = super::energy::mean_weight(&bsdf, wo, WALKS, true);
+                    let (model, model_error) = super::energy::mean_weight(&bsdf, wo, 4_000, true);
                     let difference = model.z / expected - 1.0;
-                    println!(
-                        "{name} coat {alpha:.2} base {base:.2} cos {z:.2}: walk {expected:.4} model {:.4} {:+.2} %",
-                        model.z,
-                        100.0 * difference
-                    );
                     let noise = 4.5 * (error + model_error) / expected;
-                    assert!(difference.abs() < 0.05 + noise, "{name} {alpha} {base} {z}: {expected} {model}");
+                    // 240 tests at 0.1 % together: 4.5 standard errors of both. The model itself is within 3 %, and 1 % under a
+                    // smooth coat (measured with 400 000 walks).
+                    assert!(difference.abs() < 0.03 + noise, "{name} {alpha} {base} {z}: {expected} {model}");
                 }
             }
         }
