@@ -10,6 +10,7 @@
 mod build;
 pub mod encoding;
 pub mod image;
+mod levels;
 mod mapping;
 mod noise;
 mod procedural;

@@ -23,8 +23,9 @@ use std::path::Path;
 
 use glam::{IVec2, Vec2};
 
-use super::encoding::{f32_to_half, half_to_f32};
-use super::image::{Channels, TexelData, Texels, load_texels};
+use super::encoding::half_to_f32;
+use super::image::{Channels, Texels, load_texels};
+use super::levels::{Level, Storage, build};
 use crate::math::Rgb;
 use crate::scene::description::{Encoding, TextureFilter, Wrap};
 
@@ -37,22 +38,6 @@ pub struct Pyramid {
     texels: Storage,
     channels: usize,
     levels: Vec<Level>,
-}
-
-/// Texels of all levels, one after the other.
-#[derive(Clone, Debug)]
-enum Storage {
-    U8(Vec<u8>, Box<[f32; 256]>),
-    Half(Vec<u16>),
-    Float(Vec<f32>),
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Level {
-    /// Index of its first texel.
-    start: usize,
-    width: i32,
-    height: i32,
 }
 
 /// How far a look-up reaches: s and t change by `dx` from one pixel to the next in x, by `dy` in y.
@@ -70,20 +55,9 @@ impl Pyramid {
     /// # Panics
     /// The image has no texels, or more than 2³¹ in a direction.
     pub fn new(texels: Texels) -> Self {
-        let levels = levels(texels.width, texels.height);
         let channels = texels.channels;
-        let total = levels.last().map_or(0, |level| level.start + 1) * channels;
-        let mut storage = Storage::with_capacity(texels, total);
-        let mut finer: Option<Vec<f32>> = None;
-        for pair in levels.windows(2) {
-            let coarser = match &finer {
-                None => shrink(&pair[0], &pair[1], channels, |index| storage.value(index)),
-                Some(values) => shrink(&pair[0], &pair[1], channels, |index| values[index]),
-            };
-            storage.append(&coarser);
-            finer = Some(coarser);
-        }
-        Self { texels: storage, channels, levels }
+        let (levels, texels) = build(texels);
+        Self { texels, channels, levels }
     }
 
     /// Loads an image for look-ups. `encoding` as for [`load_texels`]: a normal map is [`Encoding::Linear`].
@@ -302,16 +276,6 @@ fn sum<T: Copy, const N: usize>(
     total
 }
 
-impl Level {
-    fn size(&self) -> Vec2 {
-        Vec2::new(self.width as f32, self.height as f32)
-    }
-
-    fn index(&self, texel: IVec2) -> usize {
-        self.start + texel.y as usize * self.width as usize + texel.x as usize
-    }
-}
-
 /// ⌊v⌋, saturating; not a number becomes 0. Faster than `Vec2::floor`, which without SSE4.1 is a call.
 #[inline]
 fn floor(v: Vec2) -> IVec2 {
@@ -366,97 +330,10 @@ fn octahedral(texel: IVec2, size: IVec2) -> IVec2 {
     p.clamp(IVec2::ZERO, size - 1)
 }
 
-fn levels(width: usize, height: usize) -> Vec<Level> {
-    assert!(width > 0 && height > 0, "an image without texels");
-    let edge = |n: usize| i32::try_from(n).expect("images are narrower than 2^31 texels");
-    let mut levels = vec![Level { start: 0, width: edge(width), height: edge(height) }];
-    while let Some(last) = levels.last().filter(|level| level.width > 1 || level.height > 1) {
-        let start = last.start + last.width as usize * last.height as usize;
-        let next = Level { start, width: (last.width / 2).max(1), height: (last.height / 2).max(1) };
-        levels.push(next);
-    }
-    levels
-}
-
-/// The coarser level: means over the area that each of its texels covers, exact also for odd sizes.
-fn shrink(from: &Level, to: &Level, channels: usize, value: impl Fn(usize) -> f32) -> Vec<f32> {
-    let columns: Vec<_> = (0..to.width).map(|x| cover(x, from.width, to.width)).collect();
-    let mut out = Vec::with_capacity(to.width as usize * to.height as usize * channels);
-    for y in 0..to.height {
-        let rows = cover(y, from.height, to.height);
-        for column in &columns {
-            for channel in 0..channels {
-                let mut total = 0.0;
-                for &(y, wy) in &rows {
-                    for &(x, wx) in column {
-                        total += wx * wy * value((y * from.width as usize + x) * channels + channel);
-                    }
-                }
-                out.push(total);
-            }
-        }
-    }
-    out
-}
-
-/// Which of `from` texels the `index`th of `to` covers, with weights that sum to 1. At most three: `to` = ⌊`from` / 2⌋.
-fn cover(index: i32, from: i32, to: i32) -> [(usize, f32); 3] {
-    let (index, from, to) = (index as usize, from as usize, to as usize);
-    // In units of 1/to of a texel the ends are integers.
-    let (begin, end) = (index * from, (index + 1) * from);
-    let first = begin / to;
-    std::array::from_fn(|i| {
-        let texel = (first + i).min(from - 1);
-        let (low, high) = (begin.max((first + i) * to), end.min((first + i + 1) * to));
-        (texel, high.saturating_sub(low) as f32 / from as f32)
-    })
-}
-
-impl Storage {
-    fn with_capacity(texels: Texels, total: usize) -> Self {
-        match texels.data {
-            TexelData::U8(mut bytes) => {
-                bytes.reserve_exact(total - bytes.len());
-                Self::U8(bytes, texels.encoding.table())
-            }
-            TexelData::Half(mut halves) => {
-                halves.reserve_exact(total - halves.len());
-                Self::Half(halves)
-            }
-            TexelData::Float(mut floats) => {
-                floats.reserve_exact(total - floats.len());
-                Self::Float(floats)
-            }
-        }
-    }
-
-    fn value(&self, index: usize) -> f32 {
-        match self {
-            Self::U8(bytes, table) => table[usize::from(bytes[index])],
-            Self::Half(halves) => half_to_f32(halves[index]),
-            Self::Float(floats) => floats[index],
-        }
-    }
-
-    fn append(&mut self, values: &[f32]) {
-        match self {
-            Self::U8(bytes, table) => bytes.extend(values.iter().map(|&value| nearest_byte(table, value))),
-            Self::Half(halves) => halves.extend(values.iter().map(|&value| f32_to_half(value))),
-            Self::Float(floats) => floats.extend_from_slice(values),
-        }
-    }
-}
-
-/// The byte whose value in the ascending table is nearest in the encoded sense: the code that decodes next to `value`.
-fn nearest_byte(table: &[f32; 256], value: f32) -> u8 {
-    let above = table.partition_point(|&entry| entry < value).min(255);
-    let below = above.saturating_sub(1);
-    if value - table[below] < table[above] - value { below as u8 } else { above as u8 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::texture::image::TexelData;
     use proptest::prelude::*;
 
     const FILTERS: [TextureFilter; 4] =
@@ -586,11 +463,5 @@ mod tests {
             }
         }
 
-        #[test]
-        fn the_nearest_byte_is_the_nearest(value in 0.0_f32..1.0) {
-            let table = Encoding::Srgb.table();
-            let found = table[usize::from(nearest_byte(&table, value))];
-            prop_assert!(table.iter().all(|entry| (entry - value).abs() >= (found - value).abs()));
-        }
     }
 }
