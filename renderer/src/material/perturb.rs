@@ -1,0 +1,64 @@
+//! Shading normals that a material bends.
+
+use glam::{Vec2, Vec3};
+
+use super::Surface;
+use crate::math::{Frame, Rgb};
+use crate::scene::description::{TextureId, Value};
+use crate::texture::{RgbImage, TexturePoint, Textures};
+
+/// Step in u and v where there is no footprint: small against most features of textures, large against rounding.
+///
+/// **Source**: pbrt-v4, by behaviour.
+const STEP_WITHOUT_FOOTPRINT: f32 = 0.0005;
+
+/// Normal and tangent of the surface that `displacement` moves along the shading normal, on the side of the geometric
+/// normal; the displacement itself is not applied.
+///
+/// **Source**: \[Blinn78\], by finite differences half a footprint apart. What the displacement times the curvature of
+/// the surface would add is left out.
+pub fn bump(at: &Surface, displacement: TextureId, textures: &Textures) -> (Vec3, Vec3) {
+    let point = &at.texture_point;
+    let height = |point: &TexturePoint| textures.float(&Value::Texture(displacement), point);
+    let step = |x: f32, y: f32| {
+        let step = 0.5 * (x.abs() + y.abs());
+        if step > 0.0 { step } else { STEP_WITHOUT_FOOTPRINT }
+    };
+    let du = step(point.duvdx.x, point.duvdy.x);
+    let dv = step(point.duvdx.y, point.duvdy.y);
+    let here = height(point);
+    let beside_u = height(&TexturePoint { p: point.p + du * at.dpdu, uv: point.uv + Vec2::new(du, 0.0), ..*point });
+    let beside_v = height(&TexturePoint { p: point.p + dv * at.dpdv, uv: point.uv + Vec2::new(0.0, dv), ..*point });
+    // Derivatives on the smooth surface that the shading normals describe.
+    let tangential = |v: Vec3| v - at.ns * at.ns.dot(v);
+    let dpdu = tangential(at.dpdu) + at.ns * ((beside_u - here) / du);
+    let dpdv = tangential(at.dpdv) + at.ns * ((beside_v - here) / dv);
+    match dpdu.cross(dpdv).try_normalize() {
+        Some(ns) => (if ns.dot(at.ng) < 0.0 { -ns } else { ns }, dpdu),
+        None => (at.ns, at.dpdu),
+    }
+}
+
+/// The normal that a tangent-space normal map gives, bilinearly interpolated, repeated beyond [0, 1].
+///
+/// **Source**: pbrt-v4, by behaviour: (r, g, b) ↦ 2(r, g, b) − 1 in the frame of the shading normal and ∂p/∂u.
+pub fn normal_map(at: &Surface, map: &RgbImage) -> Vec3 {
+    let uv = at.texture_point.uv;
+    let texel = bilinear(map, Vec2::new(uv.x, 1.0 - uv.y));
+    let frame = Frame::from_normal_and_tangent(at.ns, at.dpdu);
+    let bent = 2.0 * texel - Rgb::ONE;
+    (frame.s * bent.x + frame.t * bent.y + frame.n * bent.z).try_normalize().unwrap_or(at.ns)
+}
+
+fn bilinear(image: &RgbImage, st: Vec2) -> Rgb {
+    let size = Vec2::new(image.width as f32, image.height as f32);
+    let position = st * size - 0.5;
+    let (low, weight) = (position.floor(), position - position.floor());
+    // The remainder of a float is exact, so a texture coordinate of any size lands in the image.
+    let column = |x: f32| (x.rem_euclid(size.x) as usize).min(image.width - 1);
+    let row = |y: f32| (y.rem_euclid(size.y) as usize).min(image.height - 1);
+    let texel = |dx: f32, dy: f32| image.pixel(column(low.x + dx), row(low.y + dy));
+    let upper = texel(0.0, 0.0).lerp(texel(1.0, 0.0), weight.x);
+    let lower = texel(0.0, 1.0).lerp(texel(1.0, 1.0), weight.x);
+    upper.lerp(lower, weight.y)
+}
