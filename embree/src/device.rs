@@ -13,10 +13,14 @@ use std::thread::{self, ThreadId};
 pub struct DeviceOptions {
     /// Threads that build acceleration structures; 0 takes all of the machine.
     ///
-    /// Only with 1, the default, are two builds of a scene the same and with them, bit for bit, the hits: the parallel
-    /// builder partitions primitives in an order that depends on scheduling, and that order decides which of several
-    /// coincident surfaces is hit. Embree keeps the number for the whole process, so all devices alive at a time must
-    /// agree on it. Scenes may be committed on several threads at once; each is built by the thread that asks.
+    /// With 1, the default, a scene is built the same way every time, and with it every hit is the same bit for bit:
+    /// which of several coincident surfaces is hit depends on the order that the builder leaves them in. More threads
+    /// are meant to leave the same order with [`BuildQuality::Medium`](crate::BuildQuality::Medium) (Embree's issue
+    /// 20; `tests/builder_threads.rs` holds it to that), but nobody promises it for
+    /// [`BuildQuality::High`](crate::BuildQuality::High), although `examples/determinism.rs` has found no difference.
+    ///
+    /// Embree keeps one number for the whole process, the largest of its devices', so all devices that are alive at a
+    /// time must name the same. Several scenes may be committed at once, each built by the thread that asks for it.
     pub threads: usize,
     /// Instruction set of the traversal.
     pub isa: Isa,

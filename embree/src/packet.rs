@@ -1,7 +1,6 @@
 //! Packets: four or eight rays at a time, for rays that start and go alike.
 
 use crate::callback::{self, QueryContext};
-use crate::query::raw_ray;
 use crate::{CommittedScene, Features, Hit, Ray};
 use embree_sys as sys;
 use glam::Vec3;
@@ -92,25 +91,25 @@ impl CommittedScene {
 /// Rays as structures of arrays.
 #[allow(non_snake_case)] // named after what they make
 mod transpose {
-    use super::{Ray, raw_ray, sys};
+    use super::{Ray, sys};
 
     macro_rules! transpose {
         ($n:literal, $name:ident) => {
             pub(super) fn $name(rays: &[Ray; $n]) -> sys::$name {
-                let rays = rays.each_ref().map(raw_ray);
+                let of = |field: fn(&Ray) -> f32| rays.each_ref().map(field);
                 sys::$name {
-                    org_x: rays.map(|ray| ray.org_x),
-                    org_y: rays.map(|ray| ray.org_y),
-                    org_z: rays.map(|ray| ray.org_z),
-                    tnear: rays.map(|ray| ray.tnear),
-                    dir_x: rays.map(|ray| ray.dir_x),
-                    dir_y: rays.map(|ray| ray.dir_y),
-                    dir_z: rays.map(|ray| ray.dir_z),
-                    time: rays.map(|ray| ray.time),
-                    tfar: rays.map(|ray| ray.tfar),
-                    mask: rays.map(|ray| ray.mask),
-                    id: rays.map(|ray| ray.id),
-                    flags: rays.map(|ray| ray.flags),
+                    org_x: of(|ray| ray.origin.x),
+                    org_y: of(|ray| ray.origin.y),
+                    org_z: of(|ray| ray.origin.z),
+                    tnear: of(|ray| ray.t_near.max(0.0)),
+                    dir_x: of(|ray| ray.direction.x),
+                    dir_y: of(|ray| ray.direction.y),
+                    dir_z: of(|ray| ray.direction.z),
+                    time: [0.0; $n],
+                    tfar: of(|ray| ray.t_far),
+                    mask: [u32::MAX; $n],
+                    id: [0; $n],
+                    flags: [0; $n],
                 }
             }
         };

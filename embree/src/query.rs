@@ -3,7 +3,8 @@
 use crate::callback::{self, QueryContext};
 use crate::{CommittedScene, Features};
 use embree_sys as sys;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
+use std::mem::offset_of;
 use std::ptr;
 
 /// A ray: the points `origin + t * direction` for `t` between `t_near` and `t_far`.
@@ -73,13 +74,13 @@ impl CommittedScene {
         if self.features().contains(Features::USER_GEOMETRY) {
             return self.intersect_in(ray, QueryContext::new(), None);
         }
-        let mut query = ray_hit(ray);
+        let mut query = RawRayHit::new(ray);
         let mut arguments = self.intersect_arguments(ptr::null_mut(), None);
         // SAFETY: rtcIntersect1(3). The scene is committed and cannot change: see `CommittedScene`. `query` is aligned
         // by its type and has all fields that the page names set, `arguments` those of rtcInitIntersectArguments(3);
         // without user geometry and filter there are no callbacks to want a context.
-        unsafe { sys::rtcIntersect1(self.raw(), &mut query, &mut arguments) };
-        closest(&query)
+        unsafe { sys::rtcIntersect1(self.raw(), query.as_mut_ptr(), &mut arguments) };
+        query.closest()
     }
 
     /// Whether anything lies in the ray's range.
@@ -88,11 +89,11 @@ impl CommittedScene {
         if self.features().contains(Features::USER_GEOMETRY) {
             return self.occluded_in(ray, QueryContext::new(), None);
         }
-        let mut query = raw_ray(ray);
+        let mut query = RawRay::new(ray);
         let mut arguments = self.occluded_arguments(ptr::null_mut(), None);
         // SAFETY: rtcOccluded1(3), rtcInitOccludedArguments(3): as in `intersect`.
-        unsafe { sys::rtcOccluded1(self.raw(), &mut query, &mut arguments) };
-        is_occluded(&query)
+        unsafe { sys::rtcOccluded1(self.raw(), query.as_mut_ptr(), &mut arguments) };
+        query.is_occluded()
     }
 
     /// The closest hit that the filter accepts; it is asked only about geometry made with a hit filter.
@@ -116,22 +117,22 @@ impl CommittedScene {
 
     /// Queries that call back; `filter` is none or Embree's way to the filter of the context.
     fn intersect_in(&self, ray: &Ray, mut context: QueryContext, filter: sys::RTCFilterFunctionN) -> Option<Hit> {
-        let mut query = ray_hit(ray);
+        let mut query = RawRayHit::new(ray);
         let mut arguments = self.intersect_arguments(context.as_mut_ptr(), filter);
         // SAFETY: rtcIntersect1(3): as in `intersect`; the context outlives the call and is the one that callbacks
         // expect, and none of them lets a panic out.
-        unsafe { sys::rtcIntersect1(self.raw(), &mut query, &mut arguments) };
+        unsafe { sys::rtcIntersect1(self.raw(), query.as_mut_ptr(), &mut arguments) };
         context.resume_panic();
-        closest(&query)
+        query.closest()
     }
 
     fn occluded_in(&self, ray: &Ray, mut context: QueryContext, filter: sys::RTCFilterFunctionN) -> bool {
-        let mut query = raw_ray(ray);
+        let mut query = RawRay::new(ray);
         let mut arguments = self.occluded_arguments(context.as_mut_ptr(), filter);
         // SAFETY: rtcOccluded1(3): as in `intersect_in`.
-        unsafe { sys::rtcOccluded1(self.raw(), &mut query, &mut arguments) };
+        unsafe { sys::rtcOccluded1(self.raw(), query.as_mut_ptr(), &mut arguments) };
         context.resume_panic();
-        is_occluded(&query)
+        query.is_occluded()
     }
 
     /// Arguments of a query, 32 bytes on the stack: Embree takes them by a pointer that is not `const`.
@@ -157,62 +158,100 @@ impl CommittedScene {
     }
 }
 
-/// Embree's form of a ray: time 0, seen by all masks, no flags; `tnear` is made what rtcIntersect1(3) demands.
-#[inline]
-pub(crate) fn raw_ray(ray: &Ray) -> sys::RTCRay {
-    sys::RTCRay {
-        org_x: ray.origin.x,
-        org_y: ray.origin.y,
-        org_z: ray.origin.z,
-        tnear: ray.t_near.max(0.0),
-        dir_x: ray.direction.x,
-        dir_y: ray.direction.y,
-        dir_z: ray.direction.z,
-        time: 0.0,
-        tfar: ray.t_far,
-        mask: u32::MAX,
-        id: 0,
-        flags: 0,
+/// `RTCRay`, written as vectors: Embree loads origin and direction with 16 bytes each, which four stores of a float
+/// would hold up until they have left the store buffer: 10 ns of a ray.
+#[repr(C, align(16))]
+struct RawRay {
+    origin_and_near: Vec4,
+    direction_and_time: Vec4,
+    t_far: f32,
+    mask: u32,
+    id: u32,
+    flags: u32,
+}
+
+/// `RTCRayHit`.
+#[repr(C, align(16))]
+struct RawRayHit {
+    ray: RawRay,
+    hit: sys::RTCHit,
+}
+
+const _: () = {
+    assert!(size_of::<RawRay>() == size_of::<sys::RTCRay>() && align_of::<RawRay>() == align_of::<sys::RTCRay>());
+    assert!(offset_of!(RawRay, origin_and_near) == offset_of!(sys::RTCRay, org_x));
+    assert!(offset_of!(RawRay, direction_and_time) == offset_of!(sys::RTCRay, dir_x));
+    assert!(offset_of!(RawRay, t_far) == offset_of!(sys::RTCRay, tfar));
+    assert!(offset_of!(RawRay, mask) == offset_of!(sys::RTCRay, mask));
+    assert!(offset_of!(RawRay, flags) == offset_of!(sys::RTCRay, flags));
+    assert!(size_of::<RawRayHit>() == size_of::<sys::RTCRayHit>());
+    assert!(offset_of!(RawRayHit, hit) == offset_of!(sys::RTCRayHit, hit));
+};
+
+impl RawRay {
+    /// Time 0, seen by all masks, no flags; `tnear` is made what rtcIntersect1(3) demands.
+    #[inline]
+    fn new(ray: &Ray) -> Self {
+        Self {
+            origin_and_near: ray.origin.extend(ray.t_near.max(0.0)),
+            direction_and_time: ray.direction.extend(0.0),
+            t_far: ray.t_far,
+            mask: u32::MAX,
+            id: 0,
+            flags: 0,
+        }
+    }
+
+    #[inline]
+    fn as_mut_ptr(&mut self) -> *mut sys::RTCRay {
+        ptr::from_mut(self).cast()
+    }
+
+    /// What rtcOccluded1(3) left: `tfar` of minus infinity if anything was hit.
+    #[inline]
+    fn is_occluded(&self) -> bool {
+        self.t_far == f32::NEG_INFINITY
     }
 }
 
-/// The ray with an empty hit.
-#[inline]
-fn ray_hit(ray: &Ray) -> sys::RTCRayHit {
-    let hit = sys::RTCHit {
-        Ng_x: 0.0,
-        Ng_y: 0.0,
-        Ng_z: 0.0,
-        u: 0.0,
-        v: 0.0,
-        primID: sys::RTC_INVALID_GEOMETRY_ID,
-        geomID: sys::RTC_INVALID_GEOMETRY_ID,
-        instID: [sys::RTC_INVALID_GEOMETRY_ID; 1],
-        instPrimID: [sys::RTC_INVALID_GEOMETRY_ID; 1],
-    };
-    sys::RTCRayHit { ray: raw_ray(ray), hit }
-}
-
-/// What rtcIntersect1(3) left: a valid `geomID` if there is a hit.
-#[inline]
-fn closest(query: &sys::RTCRayHit) -> Option<Hit> {
-    let hit = &query.hit;
-    if hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
-        return None;
+impl RawRayHit {
+    /// The ray with an empty hit.
+    #[inline]
+    fn new(ray: &Ray) -> Self {
+        let hit = sys::RTCHit {
+            Ng_x: 0.0,
+            Ng_y: 0.0,
+            Ng_z: 0.0,
+            u: 0.0,
+            v: 0.0,
+            primID: sys::RTC_INVALID_GEOMETRY_ID,
+            geomID: sys::RTC_INVALID_GEOMETRY_ID,
+            instID: [sys::RTC_INVALID_GEOMETRY_ID; 1],
+            instPrimID: [sys::RTC_INVALID_GEOMETRY_ID; 1],
+        };
+        Self { ray: RawRay::new(ray), hit }
     }
-    Some(Hit {
-        t: query.ray.tfar,
-        u: hit.u,
-        v: hit.v,
-        ng: Vec3::new(hit.Ng_x, hit.Ng_y, hit.Ng_z),
-        geometry: hit.geomID,
-        primitive: hit.primID,
-        instance: callback::instance(hit.instID[0]),
-    })
-}
 
-/// What rtcOccluded1(3) left: `tfar` of minus infinity if anything was hit.
-#[inline]
-fn is_occluded(ray: &sys::RTCRay) -> bool {
-    ray.tfar == f32::NEG_INFINITY
+    #[inline]
+    fn as_mut_ptr(&mut self) -> *mut sys::RTCRayHit {
+        ptr::from_mut(self).cast()
+    }
+
+    /// What rtcIntersect1(3) left: a valid `geomID` if there is a hit.
+    #[inline]
+    fn closest(&self) -> Option<Hit> {
+        let hit = &self.hit;
+        if hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
+            return None;
+        }
+        Some(Hit {
+            t: self.ray.t_far,
+            u: hit.u,
+            v: hit.v,
+            ng: Vec3::new(hit.Ng_x, hit.Ng_y, hit.Ng_z),
+            geometry: hit.geomID,
+            primitive: hit.primID,
+            instance: callback::instance(hit.instID[0]),
+        })
+    }
 }

@@ -1,6 +1,8 @@
 //! Small scenes and rays for the tests.
 #![allow(dead_code)] // each test file uses a part
 
+pub mod coincident;
+
 use embree::{Device, DeviceOptions, Geometry, Ray, TriangleIndices, UserGeometry, UserHit, VertexBuffer};
 use glam::Vec3;
 
