@@ -27,7 +27,7 @@ fn main() {
         }
         return;
     }
-    let rays = rays(400_000);
+    let rays = rays(200_000);
     for isa in [Isa::Avx2, Isa::Native] {
         let options = DeviceOptions { isa, ..DeviceOptions::default() };
         for robust in [true, false] {

@@ -7,6 +7,7 @@ use crate::{CommittedScene, CurveKind, Error, Features, MeshError, TriangleIndic
 use embree_sys as sys;
 use glam::Affine3A;
 use std::ffi::c_void;
+use std::fmt;
 use std::ptr::{self, NonNull};
 use std::sync::Arc;
 
@@ -193,6 +194,12 @@ impl Geometry {
     fn checked(self, call: &'static str) -> Result<Self, Error> {
         self.device.check(call)?;
         Ok(self)
+    }
+}
+
+impl fmt::Debug for Geometry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Geometry").field("features", &self.features).finish_non_exhaustive()
     }
 }
 

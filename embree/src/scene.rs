@@ -4,6 +4,7 @@ use crate::device::{Device, Handle};
 use crate::{Error, Features, Geometry};
 use embree_sys as sys;
 use glam::Vec3;
+use std::fmt;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
@@ -92,7 +93,7 @@ impl SceneBuilder {
         let raw = unsafe { sys::rtcNewScene(self.device.raw()) };
         let Some(raw) = NonNull::new(raw) else { return Err(self.device.refused("rtcNewScene")) };
         let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let scene = CommittedScene { raw, features, bounds: empty, _geometries: self.geometries, device: self.device };
+        let scene = CommittedScene { raw, features, bounds: empty, geometries: self.geometries, device: self.device };
         scene.fill(self.options)
     }
 }
@@ -112,7 +113,7 @@ pub struct CommittedScene {
     features: Features,
     bounds: (Vec3, Vec3),
     // Released after the scene: Embree reads their buffers and calls their callbacks as long as it exists.
-    _geometries: Vec<Geometry>,
+    geometries: Vec<Geometry>,
     device: Arc<Handle>,
 }
 
@@ -153,7 +154,7 @@ impl CommittedScene {
     /// The only modification in a scene's life: attaches the geometries, sets the options and commits.
     fn fill(mut self, options: SceneOptions) -> Result<Self, Error> {
         let (raw, flags) = (self.raw(), self.flags(options));
-        for (number, geometry) in self._geometries.iter().enumerate() {
+        for (number, geometry) in self.geometries.iter().enumerate() {
             // SAFETY: rtcCommitGeometry(3), rtcAttachGeometryByID(3): geometry and scene are of the same device and in
             // this thread's hands alone; the numbers are unused and dense.
             unsafe {
@@ -202,6 +203,14 @@ impl Drop for CommittedScene {
         // SAFETY: rtcReleaseScene(3): one reference is owned and given back once; instances that refer to the scene
         // hold an `Arc` of this value. The geometries go after it.
         unsafe { sys::rtcReleaseScene(self.raw()) };
+    }
+}
+
+impl fmt::Debug for CommittedScene {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut debug = f.debug_struct("CommittedScene");
+        debug.field("features", &self.features).field("bounds", &self.bounds);
+        debug.field("geometries", &self.geometries.len()).finish()
     }
 }
 
