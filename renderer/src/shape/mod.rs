@@ -13,7 +13,7 @@ pub mod patch;
 mod placement;
 pub mod sphere;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 pub mod triangle;
 
 use glam::{DVec3, Vec2, Vec3};
