@@ -4,7 +4,7 @@
 //! vertex needs and no more; tangents, texture coordinates and footprints are methods of [`SurfaceInteraction`], for the
 //! materials that ask.
 
-//mod alpha;
+mod alpha;
 mod footprint;
 pub mod instance;
 mod local;
@@ -18,7 +18,7 @@ mod tests;
 use embree::{CommittedScene, Hit};
 use glam::{Vec2, Vec3};
 
-//pub use alpha::AlphaTest;
+pub use alpha::AlphaTest;
 pub use instance::Instance;
 pub use rounding::TriangleTest;
 pub use surface::{CurveSet, Mesh, PatchMesh, Primitives, Surface};

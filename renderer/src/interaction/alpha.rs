@@ -4,7 +4,7 @@ use embree::{Hit, HitFilter};
 use glam::Vec2;
 
 use super::Geometry;
-use crate::sampling::hash::mix64;
+use crate::sampling::mix64;
 use crate::texture::{TexturePoint, Textures};
 
 /// Decides by a surface's alpha texture whether a hit is real.

@@ -88,6 +88,21 @@ impl Primitives {
         matches!(self, Self::Curves(_))
     }
 
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Triangles(mesh) => mesh.indices.len(),
+            Self::Patches(mesh) => mesh.indices.len(),
+            Self::Quadric(_) => 1,
+            Self::Curves(curves) => curves.segments.len(),
+        }
+    }
+
+    /// None.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Texture coordinates at the parameters of a hit.
     #[inline]
     pub fn uv(&self, primitive: u32, parameters: Vec2) -> Vec2 {

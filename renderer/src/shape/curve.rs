@@ -69,6 +69,13 @@ impl Segments {
         Ok(())
     }
 
+    /// Moves the segments of `other` behind these.
+    pub fn append(&mut self, other: &mut Segments) {
+        self.control.append(&mut other.control);
+        self.normals.append(&mut other.normals);
+        self.u.append(&mut other.u);
+    }
+
     /// How many segments.
     pub fn len(&self) -> usize {
         self.u.len()
