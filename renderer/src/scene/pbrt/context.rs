@@ -11,6 +11,29 @@ use crate::scene::Span;
 use crate::scene::description::TextureId;
 use crate::spectrum::{self, Spectrum};
 
+/// Types of version 3 of the format, by what they are of, and the nearest type of version 4.
+const OLDER_TYPES: [(&str, &str, &str); 19] = [
+    ("camera", "environment", "spherical"),
+    ("film", "image", "rgb"),
+    ("integrator", "directlighting", "path"),
+    ("integrator", "whitted", "path"),
+    ("material", "disney", "coateddiffuse"),
+    ("material", "fourier", "measured"),
+    ("material", "glass", "dielectric"),
+    ("material", "kdsubsurface", "subsurface"),
+    ("material", "matte", "diffuse"),
+    ("material", "metal", "conductor"),
+    ("material", "mirror", "conductor"),
+    ("material", "plastic", "coateddiffuse"),
+    ("material", "substrate", "coateddiffuse"),
+    ("material", "translucent", "diffusetransmission"),
+    ("material", "uber", "coateddiffuse"),
+    ("medium of type", "heterogeneous", "uniformgrid"),
+    ("sampler", "02sequence", "paddedsobol"),
+    ("sampler", "maxmindist", "pmj02bn"),
+    ("sampler", "random", "independent"),
+];
+
 /// Numbers for names, in the order in which they were first said. What a name stands for is found out at the end, since
 /// a file may use a name before it defines it.
 #[derive(Debug)]
@@ -116,7 +139,10 @@ impl Context {
 
     /// Reports a type that is not one of `known`.
     pub(super) fn unknown_type(&mut self, what: &str, name: &str, span: Span, known: &[&str]) {
-        let hint = did_you_mean(name, known.iter().copied());
+        let hint = match OLDER_TYPES.iter().find(|(of, older, _)| (*of, *older) == (what, name)) {
+            Some((.., now)) => format!(": in version 4 of the format \"{now}\" comes closest"),
+            None => did_you_mean(name, known.iter().copied()),
+        };
         self.report.error(span, format!("there is no {what} \"{}\"{hint}", shown(name)));
     }
 }

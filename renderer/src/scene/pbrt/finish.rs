@@ -3,21 +3,20 @@
 use std::collections::BTreeMap;
 
 use super::context::{Context, TextureNames};
+use super::instances;
 use super::lights;
 use super::materials::MaterialTable;
 use super::options::Picture;
-use super::reader::{InstanceEntity, MaterialRef, ObjectEntity, Reader, World};
+use super::params::Params;
+use super::reader::Reader;
 use super::report::{did_you_mean, shown};
-use super::textures::{self, TextureValues};
-use crate::math::Transform;
+use super::textures;
+use super::world::{MaterialRef, World};
 use crate::scene::description::{
-    AreaLight, AreaLightId, Instance, Material, MaterialId, MaterialKind, Medium, MediumId, Object, ObjectId, Scene,
-    Shape, ShapeKind, TextureId, Value,
+    AreaLight, AreaLightId, Material, MaterialId, MaterialKind, Medium, MediumId, Object, Scene, Shape, ShapeKind,
+    TextureId, Value,
 };
 use crate::scene::{Diagnostic, Span};
-
-/// Objects that hold instances of objects multiply: beyond this the file cannot be meant.
-const MOST_INSTANCES: usize = 1 << 28;
 
 /// The scene that was read with everything there is to say about it.
 pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Diagnostic>> {
@@ -29,22 +28,27 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
         TextureNames::Said(names) => names.into_said(),
         TextureNames::Defined(_) => Vec::new(),
     };
-    let mut resolver = Resolver {
-        textures: texture_refs.iter().map(|((values, name), span)| texture(&mut cx, *values, name, *span)).collect(),
-        materials: resolve_materials(&mut cx, materials, &material_refs),
-        media: Vec::new(),
-        area_lights: area_lights.into_iter().map(|mut params| lights::build_area(&mut cx, &mut params)).collect(),
-    };
+    let texture_ids =
+        texture_refs.iter().map(|((values, name), span)| textures::resolve(&mut cx, *values, name, *span)).collect();
+    let (material_ids, materials) = resolve_materials(&mut cx, materials, &material_refs);
+    let (area_light_ids, area_lights) = resolve_area_lights(&mut cx, area_lights);
     let lights = lights
         .into_iter()
         .filter_map(|(mut params, world_from_light)| lights::build(&mut cx, &mut params, world_from_light))
         .collect();
-    let media = resolve_media(&mut cx, media, medium_names.into_said(), &mut resolver);
+    let (medium_ids, media) = resolve_media(&mut cx, media, medium_names.into_said());
+    let resolver =
+        Resolver { textures: texture_ids, material_ids, materials, media: medium_ids, area_lights: area_light_ids };
 
     let mut shapes = world.shapes;
     shapes.iter_mut().for_each(|shape| resolver.resolve(&mut cx, shape));
-    let (objects, instances) =
-        objects(&mut cx, world.objects, world.object_names.into_said(), world.instances, &resolver);
+    let instances = instances::place(&mut cx, &world.objects, world.object_names.into_said(), &world.instances);
+    let objects = world.objects.into_iter().map(|entity| {
+        let mut shapes = entity.shapes;
+        shapes.iter_mut().for_each(|shape| resolver.resolve(&mut cx, shape));
+        Object { name: entity.name, shapes, span: entity.span }
+    });
+    let objects = objects.collect();
 
     let textures = textures::take_built(&mut cx);
     let Context { report, files, .. } = cx;
@@ -53,7 +57,6 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
     if failed {
         return Err(diagnostics);
     }
-    let area_lights = resolver.area_lights.into_iter().flatten().collect();
     let scene = Scene {
         sources: files.sources,
         camera,
@@ -63,7 +66,7 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
         seed,
         integrator,
         textures,
-        materials: resolver.materials.1,
+        materials: resolver.materials,
         lights,
         area_lights,
         media,
@@ -72,10 +75,6 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
         instances,
     };
     Ok((scene, diagnostics))
-}
-
-fn texture(cx: &mut Context, values: TextureValues, name: &str, span: Span) -> Option<TextureId> {
-    textures::resolve(cx, values, name, span)
 }
 
 /// Builds the materials and finds which of them each reference means.
@@ -95,47 +94,57 @@ fn resolve_materials(
     (ids, table.into_built())
 }
 
+/// Builds the area lights. Those that cannot be leave a gap in the ids.
+fn resolve_area_lights(cx: &mut Context, entities: Vec<Params>) -> (Vec<Option<AreaLightId>>, Vec<AreaLight>) {
+    let mut built = Vec::new();
+    let ids = entities.into_iter().map(|mut params| {
+        lights::build_area(cx, &mut params).map(|light| {
+            built.push(light);
+            AreaLightId(built.len() as u32 - 1)
+        })
+    });
+    (ids.collect(), built)
+}
+
+/// Finds which medium each name means.
 fn resolve_media(
     cx: &mut Context,
     media: BTreeMap<String, Option<Medium>>,
     said: Vec<(String, Span)>,
-    resolver: &mut Resolver,
-) -> Vec<Medium> {
-    let mut ids = BTreeMap::new();
+) -> (Vec<Option<MediumId>>, Vec<Medium>) {
     let mut built = Vec::new();
+    let mut known = BTreeMap::new();
     for (name, medium) in media {
         let id = medium.map(|medium| {
             built.push(medium);
             MediumId(built.len() as u32 - 1)
         });
-        ids.insert(name, id);
+        known.insert(name, id);
     }
-    for (name, span) in said {
-        resolver.media.push(match ids.get(&name) {
-            Some(id) => *id,
-            None => {
-                let hint = did_you_mean(&name, ids.keys().map(String::as_str));
-                cx.report.error(span, format!("there is no medium named \"{}\"{hint}", shown(&name)));
-                None
-            }
-        });
-    }
-    built
+    let find = |(name, span): (String, Span)| {
+        let id = known.get(&name).copied();
+        if id.is_none() {
+            let hint = did_you_mean(&name, known.keys().map(String::as_str));
+            cx.report.error(span, format!("there is no medium named \"{}\"{hint}", shown(&name)));
+        }
+        id.flatten()
+    };
+    (said.into_iter().map(find).collect(), built)
 }
 
 /// What the numbers in shapes stand for. `None`: an error that has been told.
 struct Resolver {
     textures: Vec<Option<TextureId>>,
-    materials: (Vec<Option<MaterialId>>, Vec<Material>),
+    material_ids: Vec<Option<MaterialId>>,
+    materials: Vec<Material>,
     media: Vec<Option<MediumId>>,
-    area_lights: Vec<Option<AreaLight>>,
+    area_lights: Vec<Option<AreaLightId>>,
 }
 
 impl Resolver {
     fn resolve(&self, cx: &mut Context, shape: &mut Shape) {
         let texture = |id: TextureId| self.textures.get(id.index()).copied().flatten();
-        let (ids, materials) = &self.materials;
-        shape.material = ids.get(shape.material.index()).copied().flatten().unwrap_or(MaterialId(0));
+        shape.material = self.material_ids.get(shape.material.index()).copied().flatten().unwrap_or(MaterialId(0));
         shape.alpha = match shape.alpha.take() {
             Some(Value::Texture(id)) => texture(id).map(Value::Texture),
             other => other,
@@ -144,95 +153,12 @@ impl Resolver {
             *displacement = displacement.and_then(texture);
         }
         shape.media = shape.media.map(|id| id.and_then(|id| self.media.get(id.index()).copied().flatten()));
-        shape.area_light = shape.area_light.and_then(|AreaLightId(index)| self.area_light(index));
+        shape.area_light = shape.area_light.and_then(|id| self.area_lights.get(id.index()).copied().flatten());
         let is_interface =
-            materials.get(shape.material.index()).is_some_and(|m| matches!(m.kind, MaterialKind::Interface));
+            self.materials.get(shape.material.index()).is_some_and(|m| matches!(m.kind, MaterialKind::Interface));
         if is_interface && shape.area_light.take().is_some() {
             let text = "a surface of material \"interface\" does not shine: drawn without its area light, as in pbrt";
             cx.report.warning("interface light", shape.span, text);
         }
-    }
-
-    /// The place of an area light among those that were built.
-    fn area_light(&self, index: u32) -> Option<AreaLightId> {
-        self.area_lights.get(index as usize)?.as_ref()?;
-        let before = self.area_lights[..index as usize].iter().flatten().count();
-        Some(AreaLightId(before as u32))
-    }
-}
-
-/// Resolves objects and places them; an instance within an object becomes instances of both.
-fn objects(
-    cx: &mut Context,
-    entities: Vec<ObjectEntity>,
-    names: Vec<(String, Span)>,
-    placed: Vec<InstanceEntity>,
-    resolver: &Resolver,
-) -> (Vec<Object>, Vec<Instance>) {
-    let mut index: BTreeMap<&str, usize> = BTreeMap::new();
-    for (at, entity) in entities.iter().enumerate() {
-        index.entry(&entity.name).or_insert(at);
-    }
-    let find = |(name, span): &(String, Span)| {
-        let found = index.get(name.as_str()).copied();
-        if found.is_none() {
-            let hint = did_you_mean(name, index.keys().copied());
-            cx.report.error(*span, format!("there is no object \"{}\"{hint}", shown(name)));
-        }
-        found
-    };
-    let targets: Vec<Option<usize>> = names.iter().map(find).collect();
-    let mut flattener = Flattener { targets, entities: &entities, open: vec![false; entities.len()], out: Vec::new() };
-    for instance in &placed {
-        flattener.place(cx, instance, &Transform::default());
-    }
-    let instances = flattener.out;
-    let objects = entities.into_iter().map(|entity| {
-        let mut shapes = entity.shapes;
-        shapes.iter_mut().for_each(|shape| resolver.resolve(cx, shape));
-        Object { name: entity.name, shapes, span: entity.span }
-    });
-    (objects.collect(), instances)
-}
-
-struct Flattener<'e> {
-    /// The objects that the numbers of names stand for.
-    targets: Vec<Option<usize>>,
-    entities: &'e [ObjectEntity],
-    /// Whether an object is being placed: within itself it must not be.
-    open: Vec<bool>,
-    out: Vec<Instance>,
-}
-
-impl Flattener<'_> {
-    fn place(&mut self, cx: &mut Context, instance: &InstanceEntity, outer: &Transform) {
-        // As deep as a stack of this function certainly goes.
-        const DEEPEST: usize = 100;
-        let Some(object) = self.targets[instance.name as usize] else { return };
-        let entity = &self.entities[object];
-        if self.open[object] {
-            cx.report.error(instance.span, format!("object \"{}\" holds an instance of itself", shown(&entity.name)));
-            return;
-        }
-        let world_from_object = *outer * instance.transform;
-        if !entity.shapes.is_empty() {
-            if self.out.len() == MOST_INSTANCES {
-                cx.report.error(instance.span, format!("more than {MOST_INSTANCES} instances"));
-                return;
-            }
-            self.out.push(Instance { object: ObjectId(object as u32), world_from_object, span: instance.span });
-        }
-        if entity.instances.is_empty() {
-            return;
-        }
-        if self.open.iter().filter(|open| **open).count() == DEEPEST {
-            cx.report.error(instance.span, format!("more than {DEEPEST} objects within each other"));
-            return;
-        }
-        self.open[object] = true;
-        for inner in &entity.instances {
-            self.place(cx, inner, &world_from_object);
-        }
-        self.open[object] = false;
     }
 }

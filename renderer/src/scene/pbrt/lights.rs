@@ -131,9 +131,6 @@ fn projection(cx: &mut Context, params: &mut Params) -> Option<LightKind> {
     let scale = params.float_where(cx, "scale", 1.0, "at least 0", |scale| scale >= 0.0);
     let fov = params.float_where(cx, "fov", 90.0, "between 0 and 180", |fov| fov > 0.0 && fov < 180.0);
     let power = power(cx, params, "power");
-    let Some(image) = params.path(cx, "filename") else {
-        cx.report.error(params.span, "light \"projection\" needs \"string filename\"");
-        return None;
-    };
+    let image = params.needed_path(cx)?;
     Some(LightKind::Projection { scale: Rgb::splat(scale), image, fov, power })
 }

@@ -264,6 +264,8 @@ fn copper(name: &str) -> Value<Spectrum> {
 }
 
 fn diffuse_transmission(cx: &mut Context, params: &mut Params) -> MaterialKind {
+    // pbrt reads it of all materials and here has no roughness to apply it to.
+    params.ignore(&["remaproughness"]);
     let reflectance = albedo(cx, params, "reflectance", 0.25);
     let transmittance = albedo(cx, params, "transmittance", 0.25);
     let scale = params.float_where(cx, "scale", 1.0, "at least 0", |scale| scale >= 0.0);

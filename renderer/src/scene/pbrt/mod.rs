@@ -11,8 +11,10 @@
 
 mod camera;
 mod context;
+mod entities;
 mod film;
 mod finish;
+mod instances;
 mod lexer;
 mod lights;
 mod materials;
@@ -26,9 +28,11 @@ mod sampling;
 mod shapes;
 pub(super) mod source;
 mod spectra;
+mod spectral_params;
 mod state;
 mod syntax;
 mod textures;
+mod world;
 
 use std::path::Path;
 

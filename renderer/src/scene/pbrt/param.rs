@@ -72,6 +72,8 @@ pub(super) enum Values {
     Integers(Vec<i32>),
     Bools(Vec<bool>),
     Strings(Vec<String>),
+    /// They were wrong, which has been told.
+    Faulty,
 }
 
 /// A parameter.
@@ -100,7 +102,7 @@ pub(super) fn read_params(cursor: &mut Cursor<'_, '_>, color_space: RgbSpace) ->
             skip_values(cursor);
             continue;
         };
-        let Ok(values) = read_values(cursor, kind, &name, span) else { continue };
+        let values = read_values(cursor, kind, &name, span).unwrap_or(Values::Faulty);
         if params.iter().any(|p| p.name == name) {
             let text = format!("\"{name}\" is given twice: the last one counts");
             cursor.report.warning(format!("twice {name}"), span, text);
@@ -195,7 +197,7 @@ fn read_values(cursor: &mut Cursor<'_, '_>, kind: ParamType, name: &str, span: S
         return Err(cursor.fault(span, format!("\"{name}\" has no value")));
     }
     if count % size != 0 {
-        let text = format!("\"{name}\" has {count} numbers, but a {} takes {size} each", kind.name());
+        let text = format!("\"{name}\" has {count} numbers, but {} takes {size} each", kind.name());
         return Err(cursor.fault(span, text));
     }
     Ok(sink.values)
@@ -224,6 +226,7 @@ impl Sink {
             Values::Integers(values) => values.len(),
             Values::Bools(values) => values.len(),
             Values::Strings(values) => values.len(),
+            Values::Faulty => 0,
         }
     }
 
@@ -243,7 +246,7 @@ impl Sink {
             Values::Floats(values) => parse_f32(word).map(|value| values.push(value)),
             Values::Integers(values) => parse_i32(word).map(|value| values.push(value)),
             Values::Bools(values) => return push_bool(values, &String::from_utf8_lossy(word)),
-            Values::Strings(_) => {
+            Values::Strings(_) | Values::Faulty => {
                 let word = shown(&String::from_utf8_lossy(word));
                 return Err(format!("expected a string in quotes, found {word}"));
             }

@@ -2,25 +2,19 @@
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use super::context::{Context, Names};
+use super::context::Context;
 use super::lexer::Lexer;
-use super::materials::{MaterialEntity, MaterialTable};
-use super::media;
 use super::options::Options;
-use super::param::Param;
 use super::params::Params;
 use super::report::{did_you_mean, shown};
-use super::shapes;
 use super::source::{Cursor, read_file};
 use super::spectra::SPACES;
-use super::state::{self, Attributes, CoordinateSystems, State, Transforms};
-use super::syntax::{Directive, Entity, read_directive};
-use super::textures::{TextureEntity, TextureTable, TextureValues};
+use super::state::{self, CoordinateSystems, State, Transforms};
+use super::syntax::{Directive, read_directive};
+use super::world::{InstanceEntity, ObjectEntity, World};
 use crate::math::Transform;
 use crate::scene::Span;
-use crate::scene::description::{AreaLightId, MaterialId, Medium, MediumId, Shape};
 use crate::spectrum::RgbSpace;
 
 /// Files within files beyond this include themselves or are not meant to be read.
@@ -28,48 +22,6 @@ const DEEPEST_INCLUDE: usize = 64;
 
 /// Files beyond this are an accident: files that each include another one twice double with every level.
 const MOST_INCLUDES: usize = 1 << 20;
-
-/// The material of a shape, before all materials are known.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum MaterialRef {
-    /// By its place in the table.
-    Slot(usize),
-    /// By its name.
-    Named(String, Span),
-}
-
-/// An object as read.
-#[derive(Debug)]
-pub(super) struct ObjectEntity {
-    pub(super) name: Arc<str>,
-    pub(super) shapes: Vec<Shape>,
-    pub(super) instances: Vec<InstanceEntity>,
-    pub(super) span: Span,
-}
-
-/// A placed object as read.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct InstanceEntity {
-    /// Number of the object's name in [`World::object_names`].
-    pub(super) name: u32,
-    pub(super) transform: Transform,
-    pub(super) span: Span,
-}
-
-/// What the directives have added so far. Shapes refer to materials, textures and media by the numbers of their names.
-pub(super) struct World {
-    pub(super) textures: TextureTable,
-    pub(super) materials: MaterialTable,
-    pub(super) material_refs: Vec<MaterialRef>,
-    pub(super) lights: Vec<(Params, Transform)>,
-    pub(super) area_lights: Vec<Params>,
-    pub(super) media: BTreeMap<String, Option<Medium>>,
-    pub(super) medium_names: Names<String>,
-    pub(super) shapes: Vec<Shape>,
-    pub(super) objects: Vec<ObjectEntity>,
-    pub(super) object_names: Names<String>,
-    pub(super) instances: Vec<InstanceEntity>,
-}
 
 /// What an end directive has to close.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,15 +36,15 @@ pub(super) struct Reader {
     pub(super) options: Options,
     pub(super) world: World,
     in_world: bool,
-    state: State,
+    pub(super) state: State,
     stack: Vec<(Block, Span, State)>,
-    systems: CoordinateSystems,
+    pub(super) systems: CoordinateSystems,
     /// The numbers of named materials in `world.material_refs`.
-    named_materials: BTreeMap<String, u32>,
+    pub(super) named_materials: BTreeMap<String, u32>,
     /// The objects that were defined.
     object_names: HashSet<String>,
     /// Index of the object that is being defined.
-    open_object: Option<usize>,
+    pub(super) open_object: Option<usize>,
     /// The files that are being read, innermost last.
     open_files: Vec<PathBuf>,
     includes: usize,
@@ -103,19 +55,7 @@ impl Reader {
         Self {
             cx: Context::new(folder),
             options: Options::default(),
-            world: World {
-                textures: TextureTable::default(),
-                materials: MaterialTable::new(),
-                material_refs: vec![MaterialRef::Slot(0)],
-                lights: Vec::new(),
-                area_lights: Vec::new(),
-                media: BTreeMap::new(),
-                medium_names: Names::default(),
-                shapes: Vec::new(),
-                objects: Vec::new(),
-                object_names: Names::default(),
-                instances: Vec::new(),
-            },
+            world: World::default(),
             in_world: false,
             state: State::default(),
             stack: Vec::new(),
@@ -133,6 +73,7 @@ impl Reader {
         self.open_files.push(path.canonicalize().unwrap_or_else(|_| path.to_owned()));
         self.read_text(path, text, None);
         self.open_files.pop();
+        self.close_all();
         if !self.in_world {
             self.cx.report.error_nowhere("the scene has no WorldBegin: there is nothing to see");
         }
@@ -155,7 +96,6 @@ impl Reader {
             self.cx.report.error(Span { file, start: 0, end: 2 }, "the file is UTF-16: save it as UTF-8");
             return;
         }
-        let opened = self.stack.len();
         let mut lexer = Lexer::new(&text);
         loop {
             let mut cursor = Cursor::new(lexer, file, &mut self.cx.report);
@@ -172,17 +112,17 @@ impl Reader {
                 self.apply(directive, span);
             }
         }
-        // What this file opened and left open: told here, where the file is known.
-        for (block, span, state) in self.stack.drain(opened.min(self.stack.len())..).rev() {
+    }
+
+    /// Tells what was opened and never closed, and closes it.
+    fn close_all(&mut self) {
+        for (block, span, state) in self.stack.drain(..).rev() {
             let text = match block {
                 Block::Attribute => "AttributeBegin has no AttributeEnd",
                 Block::Object => "ObjectBegin has no ObjectEnd",
             };
             self.cx.report.error(span, text);
             self.state = state;
-            if block == Block::Object {
-                self.open_object = None;
-            }
         }
     }
 
@@ -248,13 +188,13 @@ impl Reader {
         }
     }
 
-    fn only_in_world(&mut self, name: &str, span: Span) {
+    pub(super) fn only_in_world(&mut self, name: &str, span: Span) {
         if !self.in_world {
             self.cx.report.error(span, format!("{name} belongs after WorldBegin"));
         }
     }
 
-    fn only_before_world(&mut self, name: &str, span: Span) {
+    pub(super) fn only_before_world(&mut self, name: &str, span: Span) {
         if self.in_world {
             self.cx.report.error(span, format!("{name} belongs before WorldBegin"));
         }
@@ -317,9 +257,9 @@ impl Reader {
     }
 
     /// The transform at the start of the shutter; motion is told and not drawn.
-    fn placed(&mut self, what: &str, span: Span) -> Transform {
+    pub(super) fn placed(&mut self, what: &str, span: Span) -> Transform {
         if self.state.moves() {
-            let text = format!("the motion of a {what} is not rendered: it is drawn where it starts");
+            let text = format!("motion is not rendered: this {what} is drawn where it starts");
             self.cx.report.warning(format!("motion {what}"), span, text);
         }
         self.state.transforms[0]
@@ -359,157 +299,6 @@ impl Reader {
         }
     }
 
-    fn named_material(&mut self, name: String, span: Span) {
-        self.only_in_world("NamedMaterial", span);
-        let refs = &mut self.world.material_refs;
-        self.state.material = *self.named_materials.entry(name.clone()).or_insert_with(|| {
-            refs.push(MaterialRef::Named(name, span));
-            refs.len() as u32 - 1
-        });
-    }
-
-    fn medium_interface(&mut self, inside: String, outside: String, span: Span) {
-        let mut medium =
-            |name: String| (!name.is_empty()).then(|| MediumId(self.world.medium_names.intern(name, span)));
-        self.state.media = [medium(inside), medium(outside)];
-    }
-
-    fn texture(&mut self, name: String, values: &str, params: Params) {
-        let span = params.span;
-        let values = match values {
-            "float" => TextureValues::Float,
-            "spectrum" => TextureValues::Spectrum,
-            // Its name before version 4.
-            "color" => {
-                self.cx.report.warning("color texture", span, "a texture of \"color\" is now one of \"spectrum\"");
-                TextureValues::Spectrum
-            }
-            other => {
-                let other = shown(other);
-                let text = format!("a texture is \"float\" or \"spectrum\", not \"{other}\"");
-                self.cx.report.error(span, text);
-                return;
-            }
-        };
-        let world_from_texture = self.placed("texture", span);
-        let shown_name = shown(&name);
-        if !self.world.textures.add(TextureEntity { name, values, params, world_from_texture }) {
-            self.cx.report.error(span, format!("there is already a texture \"{shown_name}\" of these values"));
-        }
-    }
-
-    fn entity(&mut self, entity: Entity, name: String, params: Vec<Param>, span: Span) {
-        let attributes = Arc::clone(&self.state.attributes);
-        match entity {
-            Entity::Shape => {
-                self.only_in_world("Shape", span);
-                self.shape(Params::new("shape", name, span, params, &attributes.shape));
-            }
-            Entity::Light => {
-                self.only_in_world("LightSource", span);
-                let world_from_light = self.placed("light", span);
-                let params = Params::new("light", name, span, params, &attributes.light);
-                self.world.lights.push((params, world_from_light));
-            }
-            Entity::AreaLight => {
-                self.only_in_world("AreaLightSource", span);
-                self.state.area_light = Some(self.world.area_lights.len() as u32);
-                self.world.area_lights.push(Params::new("area light", name, span, params, &attributes.light));
-            }
-            Entity::Material => {
-                self.only_in_world("Material", span);
-                let params = Params::new("material", name, span, params, &attributes.material);
-                if let Some(slot) = self.world.materials.add(MaterialEntity { name: None, params }) {
-                    self.state.material = self.world.material_refs.len() as u32;
-                    self.world.material_refs.push(MaterialRef::Slot(slot));
-                }
-            }
-            Entity::NamedMaterial => {
-                self.only_in_world("MakeNamedMaterial", span);
-                let params = Params::new("material", name.clone(), span, params, &attributes.material);
-                if self.world.materials.add(MaterialEntity { name: Some(name.clone()), params }).is_none() {
-                    self.cx.report.error(span, format!("there is already a material named \"{}\"", shown(&name)));
-                }
-            }
-            Entity::NamedMedium => {
-                let mut params = Params::new("medium", name.clone(), span, params, &attributes.medium);
-                if self.world.media.contains_key(&name) {
-                    self.cx.report.error(span, format!("there is already a medium named \"{}\"", shown(&name)));
-                    return;
-                }
-                let medium = media::build(&mut self.cx, &mut params);
-                self.world.media.insert(name, medium);
-            }
-            Entity::Attribute => self.attribute(&name, params, span),
-            Entity::Camera => {
-                self.only_before_world("Camera", span);
-                let camera_from_world = self.placed("camera", span);
-                let systems = self.state.transforms.map(|transform| transform.inverse());
-                self.systems.insert("camera".to_owned(), systems);
-                let params = Params::new("camera", name, span, params, &[]);
-                self.options.set_camera(&mut self.cx, params, camera_from_world.inverse());
-            }
-            Entity::Film => {
-                self.only_before_world("Film", span);
-                let params = Params::new("film", name, span, params, &[]);
-                self.options.set_film(&mut self.cx, params, self.state.color_space);
-            }
-            Entity::PixelFilter => {
-                self.option(entity, "PixelFilter", Params::new("pixel filter", name, span, params, &[]))
-            }
-            Entity::Sampler => self.option(entity, "Sampler", Params::new("sampler", name, span, params, &[])),
-            Entity::Integrator => self.option(entity, "Integrator", Params::new("integrator", name, span, params, &[])),
-            // How rays find shapes is Embree's.
-            Entity::Accelerator => self.only_before_world("Accelerator", span),
-        }
-    }
-
-    fn option(&mut self, entity: Entity, name: &str, params: Params) {
-        self.only_before_world(name, params.span);
-        self.options.set_other(&mut self.cx, entity, params);
-    }
-
-    fn attribute(&mut self, target: &str, params: Vec<Param>, span: Span) {
-        let attributes = Arc::make_mut(&mut self.state.attributes);
-        let Some(list) = attributes.target(target) else {
-            self.cx.unknown_type("target of Attribute", target, span, &Attributes::TARGETS);
-            return;
-        };
-        for mut param in params {
-            param.inherited = true;
-            list.retain(|p| p.name != param.name);
-            list.push(param);
-        }
-    }
-
-    fn shape(&mut self, mut params: Params) {
-        let span = params.span;
-        let world_from_shape = self.placed("shape", span);
-        let kind = shapes::build(&mut self.cx, &mut params);
-        let alpha = shapes::alpha(&mut self.cx, &mut params);
-        params.finish(&mut self.cx);
-        let mut area_light = self.state.area_light.map(AreaLightId);
-        if self.open_object.is_some() && area_light.take().is_some() {
-            let text = "shapes of objects do not shine: this one is drawn without its area light, as in pbrt";
-            self.cx.report.warning("area light in object", span, text);
-        }
-        let Some(kind) = kind else { return };
-        let shape = Shape {
-            world_from_shape,
-            reverse_orientation: self.state.reverse_orientation,
-            kind,
-            material: MaterialId(self.state.material),
-            area_light,
-            alpha,
-            media: self.state.media,
-            span,
-        };
-        match self.open_object {
-            Some(object) => self.world.objects[object].shapes.push(shape),
-            None => self.world.shapes.push(shape),
-        }
-    }
-
     fn include(&mut self, name: &str, span: Span) {
         let path = self.cx.files.resolve(name, span.file);
         // Two names of one file are the same file.
@@ -536,15 +325,18 @@ impl Reader {
         }
     }
 
-    /// As `include`, except that what the file changes of the state ends with it.
+    /// As `include`, except that what the file changes of the state ends with it, and that it may not end what it did
+    /// not begin.
     fn import(&mut self, name: &str, span: Span) {
-        self.only_in_world("Import", span);
+        if !self.in_world {
+            return self.only_in_world("Import", span);
+        }
         let state = self.state.clone();
         let systems = self.systems.clone();
-        // The file may not end what it did not begin.
         let stack = std::mem::take(&mut self.stack);
         let open_object = self.open_object;
         self.include(name, span);
+        self.close_all();
         (self.state, self.systems, self.stack, self.open_object) = (state, systems, stack, open_object);
     }
 }

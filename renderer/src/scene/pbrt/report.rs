@@ -100,8 +100,11 @@ fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Opt
         return None;
     }
     let lower = name.to_lowercase();
+    // Enough for every table of ours and for the names of most scenes; a guess is not worth more.
+    const MOST: usize = 5000;
     candidates
         .into_iter()
+        .take(MOST)
         .filter(|candidate| candidate.len() <= LONGEST)
         .map(|candidate| (edit_distance(&lower, &candidate.to_lowercase()), candidate))
         .min_by_key(|&(distance, _)| distance)

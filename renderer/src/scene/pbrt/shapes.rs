@@ -28,12 +28,16 @@ pub(super) fn build(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> 
             let (z_min, z_max) = (z_min.min(z_max), z_min.max(z_max));
             Some(ShapeKind::Cylinder { radius, z_min, z_max, phi_max: phi_max(cx, params) })
         }
-        "disk" => Some(ShapeKind::Disk {
-            height: params.float(cx, "height", 0.0),
-            radius: params.positive(cx, "radius", 1.0),
-            inner_radius: params.float_where(cx, "innerradius", 0.0, "at least 0", |r| r >= 0.0),
-            phi_max: phi_max(cx, params),
-        }),
+        "disk" => {
+            let radius = params.positive(cx, "radius", 1.0);
+            let inside = |r: f32| (0.0..radius).contains(&r);
+            Some(ShapeKind::Disk {
+                height: params.float(cx, "height", 0.0),
+                radius,
+                inner_radius: params.float_where(cx, "innerradius", 0.0, "at least 0 and less than the radius", inside),
+                phi_max: phi_max(cx, params),
+            })
+        }
         "trianglemesh" => triangle_mesh(cx, params),
         "plymesh" => ply(cx, params),
         "bilinearmesh" => bilinear_mesh(cx, params),
@@ -62,7 +66,7 @@ fn indices<const N: usize>(cx: &mut Context, params: &mut Params, vertices: usiz
     let Some(indices) = params.ints(cx, "indices") else {
         // One triangle or patch needs no indices.
         let implied = (vertices == N).then(|| vec![std::array::from_fn(|i| i as u32)]);
-        if implied.is_none() {
+        if implied.is_none() && !params.has("indices") {
             cx.report.error(params.span, format!("shape \"{}\" needs \"integer indices\"", params.name));
         }
         return implied;
@@ -93,11 +97,10 @@ fn per_vertex<T>(cx: &mut Context, params: &Params, name: &str, values: Vec<T>, 
 
 fn positions(cx: &mut Context, params: &mut Params) -> Option<Vec<Vec3>> {
     let positions = params.point3s(cx, "P");
-    if positions.is_empty() {
+    if positions.is_empty() && !params.has("P") {
         cx.report.error(params.span, format!("shape \"{}\" needs \"point3 P\"", params.name));
-        return None;
     }
-    Some(positions)
+    (!positions.is_empty()).then_some(positions)
 }
 
 fn triangle_mesh(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
@@ -105,10 +108,12 @@ fn triangle_mesh(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
     params.ignore(&["faceIndices"]);
     let (uvs, normals) = (params.point2s(cx, "uv"), params.normals(cx, "N"));
     let tangents = params.vector3s(cx, "S");
-    let positions = positions(cx, params);
-    let vertices = positions.as_ref().map_or(0, Vec::len);
+    let Some(positions) = positions(cx, params) else {
+        params.ignore(&["indices"]);
+        return None;
+    };
+    let vertices = positions.len();
     let indices = indices(cx, params, vertices);
-    let positions = positions?;
     Some(ShapeKind::Triangles(TriangleMesh {
         indices: indices?,
         normals: per_vertex(cx, params, "N", normals, vertices),
@@ -126,10 +131,12 @@ fn bilinear_mesh(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
         params.ignore(&["emissionfilename"]);
     }
     let (uvs, normals) = (params.point2s(cx, "uv"), params.normals(cx, "N"));
-    let positions = positions(cx, params);
-    let vertices = positions.as_ref().map_or(0, Vec::len);
+    let Some(positions) = positions(cx, params) else {
+        params.ignore(&["indices"]);
+        return None;
+    };
+    let vertices = positions.len();
     let indices = indices(cx, params, vertices);
-    let positions = positions?;
     Some(ShapeKind::Bilinear(BilinearMesh {
         indices: indices?,
         normals: per_vertex(cx, params, "N", normals, vertices),
@@ -145,11 +152,7 @@ fn ply(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
         let text = "displaced meshes are not rendered: the mesh is drawn as its file has it";
         cx.report.warning("displaced mesh", params.span_of("displacement"), text);
     }
-    let Some(path) = params.path(cx, "filename") else {
-        cx.report.error(params.span, "shape \"plymesh\" needs \"string filename\"");
-        return None;
-    };
-    Some(ShapeKind::Ply { path, displacement })
+    Some(ShapeKind::Ply { path: params.needed_path(cx)?, displacement })
 }
 
 fn loop_subdivision(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
@@ -157,9 +160,11 @@ fn loop_subdivision(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> 
     params.ignore(&["scheme"]);
     // Each level has four times the triangles of the one before it.
     let levels = params.int(cx, "levels", 3, 0..=10);
-    let positions = positions(cx, params);
-    let indices = indices(cx, params, positions.as_ref().map_or(0, Vec::len));
-    let mesh = TriangleMesh { indices: indices?, positions: positions?, ..TriangleMesh::default() };
+    let Some(positions) = positions(cx, params) else {
+        params.ignore(&["indices"]);
+        return None;
+    };
+    let mesh = TriangleMesh { indices: indices(cx, params, positions.len())?, positions, ..TriangleMesh::default() };
     Some(ShapeKind::Loop { levels, mesh })
 }
 
@@ -172,8 +177,9 @@ enum Basis {
 fn curve(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
     // How finely pbrt splits a curve to find its hits.
     params.ignore(&["splitdepth"]);
-    let width = params.float(cx, "width", 1.0);
-    let width = [params.float(cx, "width0", width), params.float(cx, "width1", width)];
+    let mut width = |name, default| params.float_where(cx, name, default, "at least 0", |width| width >= 0.0);
+    let both = width("width", 1.0);
+    let width = [width("width0", both), width("width1", both)];
     let degree = params.int(cx, "degree", 3, 2..=3) as usize;
     let basis = params.choice(cx, "basis", &[("bezier", Basis::Bezier), ("bspline", Basis::BSpline)]);
     let kinds = [("flat", CurveKind::Flat), ("cylinder", CurveKind::Cylinder), ("ribbon", CurveKind::Ribbon)];
@@ -187,11 +193,11 @@ fn curve(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
         Basis::BSpline => points.len() > degree,
     };
     if !fits {
-        let need = match basis {
-            Basis::Bezier => format!("{} and {degree} for each further segment", degree + 1),
-            Basis::BSpline => format!("at least {}", degree + 1),
+        let (name, need) = match basis {
+            Basis::Bezier => ("Bézier curve", format!("{} points and {degree} for each further segment", degree + 1)),
+            Basis::BSpline => ("B-spline", format!("at least {} points", degree + 1)),
         };
-        let text = format!("a curve of degree {degree} in this basis has {need} points, not {}", points.len());
+        let text = format!("a {name} of degree {degree} has {need}, not {}", points.len());
         cx.report.error(params.span_of("P"), text);
         return None;
     }
@@ -201,8 +207,11 @@ fn curve(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
     let normals = match kind {
         CurveKind::Ribbon if normals.len() == control.len() + 1 => normals,
         CurveKind::Ribbon => {
-            let text =
-                format!("a ribbon of {} segments needs {0} + 1 normals \"N\", not {}", control.len(), normals.len());
+            let text = format!(
+                "a ribbon of {} segments needs a normal \"N\" at each of their ends, not {}",
+                control.len(),
+                normals.len()
+            );
             cx.report.error(params.span_of("N"), text);
             return None;
         }

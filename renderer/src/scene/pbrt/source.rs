@@ -170,7 +170,10 @@ impl<'t, 'r> Cursor<'t, 'r> {
         }
         let mut numbers = [0.0; N];
         for (index, number) in numbers.iter_mut().enumerate() {
-            let expected = format!("number {} of {N}", index + 1);
+            let expected = match index {
+                0 => format!("{N} numbers"),
+                _ => format!("{N} numbers, of which {index} came"),
+            };
             match self.peek() {
                 Some(token) if token.kind == Kind::Word => {
                     let word = shown(&self.content(token));

@@ -317,10 +317,7 @@ fn image(
     let scale = params.float(cx, "scale", 1.0);
     let invert = params.bool(cx, "invert", false);
     let encoding = encoding(cx, params);
-    let Some(path) = params.path(cx, "filename") else {
-        cx.report.error(params.span, "an image texture needs \"string filename\"");
-        return None;
-    };
+    let path = params.needed_path(cx)?;
     let monochrome = values == TextureValues::Float;
     Some(ImageTexture { path, mapping, wrap, filter, encoding, scale, invert, monochrome })
 }
