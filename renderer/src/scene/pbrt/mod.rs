@@ -67,3 +67,6 @@ pub fn parse(text: &[u8], folder: &Path, name: &str) -> Result<Loaded, Vec<Diagn
     reader.read(&folder.join(name), text.to_vec());
     finish::finish(reader)
 }
+
+#[cfg(test)]
+mod tests;
