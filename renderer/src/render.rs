@@ -1,1 +1,408 @@
-//! Skeleton: being written.
+//! From scene file to film. Read this first: every other module is one line of it.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use crate::compile::{self, CompileError};
+use crate::film::{AovSet, Film, Tile};
+use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries};
+use crate::sampling::{Dimension, Sampler};
+use crate::scene::{self, Diagnostic};
+use crate::world::World;
+
+/// What to render, and what of the scene file to override.
+#[derive(Clone, Debug, Default)]
+pub struct Job {
+    /// The scene file.
+    pub scene: PathBuf,
+    /// Samples per pixel; `None`: the file's.
+    pub spp: Option<u64>,
+    /// Seed of all randomness; `None`: the file's.
+    pub seed: Option<u64>,
+    /// Size of the frame; `None`: the file's.
+    pub resolution: Option<[u32; 2]>,
+    /// Part of the frame, x0 x1 y0 y1 in [0, 1].
+    pub crop: Option<[f32; 4]>,
+    /// Part of the frame, x0 x1 y0 y1 in pixels, upper ends exclusive. Wins over `crop`.
+    pub pixel_bounds: Option<[i32; 4]>,
+    /// The samples of each pixel to take; `None`: `0..spp`.
+    pub sample_range: Option<Range<u64>>,
+    /// Threads that render; 0: as many as there are.
+    pub threads: usize,
+    /// Auxiliary outputs, besides those that the file asks for.
+    pub aovs: AovSet,
+    /// Stop at the end of the pass in which this time is over.
+    pub time_limit: Option<Duration>,
+}
+
+/// What a job is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Reading the scene's files.
+    Parse,
+    /// Building the world from them.
+    Compile,
+    /// Tracing paths.
+    Render,
+}
+
+/// Who is told how a job goes. Called from any thread.
+pub trait Observer: Sync {
+    /// The picture will not be quite what the scene asks for.
+    fn warning(&self, _warning: &Diagnostic) {}
+    /// A phase begins.
+    fn phase(&self, _phase: Phase) {}
+    /// The share of the samples that is done, in [0, 1], monotone.
+    fn progress(&self, _done: f64) {}
+    /// Whether to stop: at the end of the pass, so that every pixel has the same samples.
+    fn stop_requested(&self) -> bool {
+        false
+    }
+}
+
+/// An observer that does not look.
+pub struct Unobserved;
+
+impl Observer for Unobserved {}
+
+/// What a job cannot go on from.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The scene's files are wrong; warnings are among the messages.
+    #[error("the scene cannot be read: {}", count_errors(.0))]
+    Scene(Vec<Diagnostic>),
+    /// The scene cannot be built; warnings are among the messages.
+    #[error("the scene cannot be built: {}", count_errors(.0))]
+    Compile(Vec<Diagnostic>),
+    /// Embree does not start.
+    #[error("Embree cannot be used: {0}")]
+    Embree(#[from] embree::Error),
+    /// No threads.
+    #[error("cannot start {threads} render threads: {why}")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system says.
+        why: rayon::ThreadPoolBuildError,
+    },
+    /// Nothing to do.
+    #[error("the sample range {}:{} is empty; the first number must be less than the second", .0.start, .0.end)]
+    EmptySampleRange(Range<u64>),
+}
+
+fn count_errors(diagnostics: &[Diagnostic]) -> String {
+    match diagnostics.iter().filter(|d| d.severity == scene::Severity::Error).count() {
+        1 => "1 error".into(),
+        n => format!("{n} errors"),
+    }
+}
+
+/// A rendered frame.
+pub struct Frame {
+    /// All sums.
+    pub film: Film,
+    /// What was rendered, for the image's metadata.
+    pub description: FrameDescription,
+    /// What it took.
+    pub statistics: Statistics,
+}
+
+/// What of a frame depends on the scene and the job alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameDescription {
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// The samples of each pixel that were taken.
+    pub sample_range: Range<u64>,
+    /// The samples of each pixel that were asked for.
+    pub sample_range_asked: Range<u64>,
+    /// Hash of the text of the scene's files.
+    pub scene_hash: u64,
+    /// Camera space from world space.
+    pub camera_from_world: glam::DMat4,
+    /// Screen space, normalised to [0, 1]², from world space.
+    pub ndc_from_world: Option<glam::DMat4>,
+    /// The output that the scene names.
+    pub filename: Option<PathBuf>,
+}
+
+impl FrameDescription {
+    /// Whether all samples were taken.
+    pub fn complete(&self) -> bool {
+        self.sample_range == self.sample_range_asked
+    }
+}
+
+/// What a job took.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Seconds of reading.
+    pub parse_seconds: f64,
+    /// Seconds of building.
+    pub compile_seconds: f64,
+    /// Seconds of tracing.
+    pub render_seconds: f64,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Passes over the frame.
+    pub passes: u64,
+    /// Rays and samples.
+    pub counters: Counters,
+    /// Bytes that Embree held, at most.
+    pub embree_bytes: u64,
+    /// Bytes of the film.
+    pub film_bytes: u64,
+    /// Shapes and triangles, with every instance counted, and without.
+    pub triangles: u64,
+    /// Triangles in memory.
+    pub unique_triangles: u64,
+}
+
+/// A scene that is read and built, with what of the job it decides.
+pub struct Prepared {
+    /// The world.
+    pub world: World,
+    /// What will be rendered; no sample is taken yet.
+    pub description: FrameDescription,
+    /// Auxiliary outputs of the job and of the file.
+    pub aovs: AovSet,
+    /// Seconds so far.
+    pub statistics: Statistics,
+    /// Owns the BVH's memory.
+    pub device: embree::Device,
+}
+
+/// Renders one job.
+///
+/// # Errors
+/// A scene that cannot be read or built, a machine that cannot run it; nothing after the first sample.
+pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> {
+    let pool = thread_pool(job.threads)?;
+    let prepared = pool.install(|| prepare(job, observer))?;
+    Ok(pool.install(|| trace(prepared, job.time_limit, observer)))
+}
+
+/// The threads of a job.
+///
+/// # Errors
+/// When the system gives none.
+pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, RenderError> {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("render-{index}"));
+    builder.build().map_err(|why| RenderError::Threads { threads, why })
+}
+
+/// Reads and builds the scene of a job.
+///
+/// # Errors
+/// All that is wrong with the scene, not the first of it.
+pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderError> {
+    let mut statistics = Statistics { threads: rayon::current_num_threads(), ..Statistics::default() };
+    observer.phase(Phase::Parse);
+    let start = Instant::now();
+    let (mut description, warnings) = scene::pbrt::load(&job.scene).map_err(RenderError::Scene)?;
+    warnings.iter().for_each(|warning| observer.warning(warning));
+    apply(job, &mut description);
+    statistics.parse_seconds = start.elapsed().as_secs_f64();
+
+    let seed = job.seed.unwrap_or(description.seed);
+    let asked = job.sample_range.clone().unwrap_or(0..job.spp.unwrap_or(description.spp).max(1));
+    if asked.is_empty() {
+        return Err(RenderError::EmptySampleRange(asked));
+    }
+    let mut aovs = job.aovs;
+    if description.film.gbuffer {
+        aovs = AovSet::all();
+    }
+
+    observer.phase(Phase::Compile);
+    let start = Instant::now();
+    let device = embree::Device::new(&embree::DeviceOptions::default())?;
+    let (world, warnings) = compile::world(&description, &device).map_err(|errors| match errors {
+        CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
+        CompileError::Embree(error) => RenderError::Embree(error),
+    })?;
+    warnings.iter().for_each(|warning| observer.warning(warning));
+    statistics.compile_seconds = start.elapsed().as_secs_f64();
+    statistics.embree_bytes = device.memory().peak as u64;
+    (statistics.triangles, statistics.unique_triangles) = world.geometry.triangle_counts();
+
+    let description = FrameDescription {
+        seed,
+        sample_range: asked.start..asked.start,
+        sample_range_asked: asked,
+        scene_hash: description.sources.hash(),
+        camera_from_world: description.camera.world_from_camera.inverse().matrix(),
+        ndc_from_world: world.camera.ndc_from_world(),
+        filename: description.film.filename.clone(),
+    };
+    Ok(Prepared { world, description, aovs, statistics, device })
+}
+
+/// Traces all passes of a prepared job.
+pub fn trace(prepared: Prepared, time_limit: Option<Duration>, observer: &dyn Observer) -> Frame {
+    let Prepared { world, mut description, aovs, mut statistics, .. } = prepared;
+    observer.phase(Phase::Render);
+    let start = Instant::now();
+    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, aovs);
+    statistics.film_bytes = Film::memory(film.bounds(), aovs);
+    let asked = description.sample_range_asked.clone();
+    let progress = Progress::new(&film, &asked, observer);
+    for pass in passes(&asked) {
+        statistics.counters += match world.geometry.alpha_test(&world.textures) {
+            None => trace_pass(&world, &Opaque(world.geometry.scene()), &mut film, &pass, description.seed, &progress),
+            Some(alpha) => {
+                let queries = AlphaTested { scene: world.geometry.scene(), alpha };
+                trace_pass(&world, &queries, &mut film, &pass, description.seed, &progress)
+            }
+        };
+        statistics.passes += 1;
+        description.sample_range.end = pass.end;
+        let over = time_limit.is_some_and(|limit| start.elapsed() >= limit);
+        if over || observer.stop_requested() {
+            break;
+        }
+    }
+    statistics.render_seconds = start.elapsed().as_secs_f64();
+    Frame { film, description, statistics }
+}
+
+/// Cuts a range of samples into passes over the whole frame: short ones first, so that a job that is stopped early has
+/// something, then of [`PASS_SPP`], so that the threads seldom wait for each other.
+pub fn passes(range: &Range<u64>) -> impl Iterator<Item = Range<u64>> + use<> {
+    let (mut next, end, mut length) = (range.start, range.end, 1);
+    std::iter::from_fn(move || {
+        let pass = next..end.min(next.saturating_add(length));
+        next = pass.end;
+        length = (2 * length).min(PASS_SPP);
+        (!pass.is_empty()).then_some(pass)
+    })
+}
+
+/// The longest pass, in samples per pixel.
+const PASS_SPP: u64 = 16;
+
+/// Traces samples `pass` of every pixel into `film`.
+fn trace_pass<Q: Queries + Sync>(
+    world: &World,
+    queries: &Q,
+    film: &mut Film,
+    pass: &Range<u64>,
+    seed: u64,
+    progress: &Progress<'_>,
+) -> Counters {
+    let sampler = Sampler::new(seed);
+    let first_hit = film.aovs().first_hit();
+    let mut tiles = film.tiles();
+    let counters = tiles.par_iter_mut().map(|tile| {
+        let counters = trace_tile(world, queries, tile, pass, &sampler, first_hit);
+        progress.add(counters.camera_rays);
+        counters
+    });
+    counters.reduce(Counters::default, |mut sum, counters| {
+        sum += counters;
+        sum
+    })
+}
+
+/// Traces samples `pass` of every pixel of one tile.
+pub fn trace_tile<Q: Queries>(
+    world: &World,
+    queries: &Q,
+    tile: &mut Tile<'_>,
+    pass: &Range<u64>,
+    sampler: &Sampler,
+    first_hit: bool,
+) -> Counters {
+    let mut counters = Counters::default();
+    tile.for_each(|[x, y], pixel, mut auxiliary| {
+        for index in pass.clone() {
+            let numbers = sampler.pixel_sample([x, y], index);
+            let offset = world.filter.sample(numbers.d2(Dimension::FILM));
+            let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
+            let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else {
+                pixel.add(glam::Vec3::ZERO, 0.0, offset.weight);
+                counters.camera_rays += 1;
+                continue;
+            };
+            let sample = integrator::trace(world, queries, &camera, &numbers, first_hit, &mut counters);
+            let mut radiance = world.sensor.expose(sample.radiance);
+            // A sensor's response may leave its gamut: negative is rejected only as radiance.
+            if !radiance.is_finite() || sample.radiance.min_element() < 0.0 {
+                counters.rejected_samples += 1;
+                radiance = glam::Vec3::ZERO;
+            }
+            pixel.add(radiance, sample.alpha, offset.weight);
+            if let Some(auxiliary) = auxiliary.as_deref_mut().filter(|_| sample.alpha > 0.0) {
+                auxiliary.add(&sample.first);
+            }
+        }
+    });
+    counters
+}
+
+/// Counts camera rays over all threads and tells the observer, seldom enough that counting costs nothing.
+struct Progress<'a> {
+    observer: &'a dyn Observer,
+    total: f64,
+    done: AtomicU64,
+    told_permille: AtomicU64,
+    telling: AtomicBool,
+}
+
+impl<'a> Progress<'a> {
+    fn new(film: &Film, samples: &Range<u64>, observer: &'a dyn Observer) -> Self {
+        let total = film.bounds().area() as f64 * (samples.end - samples.start) as f64;
+        let (done, told_permille, telling) = Default::default();
+        Self { observer, total, done, told_permille, telling }
+    }
+
+    fn add(&self, rays: u64) {
+        let done = (self.done.fetch_add(rays, Ordering::Relaxed) + rays) as f64 / self.total;
+        let permille = (done * 1000.0) as u64;
+        // One thread tells at a time, and only more than was told before: the observer sees a monotone sequence.
+        if permille > self.told_permille.load(Ordering::Relaxed) && !self.telling.swap(true, Ordering::Acquire) {
+            if permille > self.told_permille.load(Ordering::Relaxed) {
+                self.told_permille.store(permille, Ordering::Relaxed);
+                self.observer.progress(done);
+            }
+            self.telling.store(false, Ordering::Release);
+        }
+    }
+}
+
+/// Lets the job's overrides stand in for what the file says.
+fn apply(job: &Job, description: &mut scene::Scene) {
+    if let Some(resolution) = job.resolution {
+        description.film.resolution = resolution;
+        description.film.pixel_bounds = None;
+    }
+    if let Some(crop) = job.crop {
+        description.film.crop_window = Some(crop);
+        description.film.pixel_bounds = None;
+    }
+    if let Some(bounds) = job.pixel_bounds {
+        description.film.pixel_bounds = Some(bounds);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_cover_the_range_once_and_in_order() {
+        for range in [0..1, 0..100, 7..9, u64::MAX - 40..u64::MAX] {
+            let mut next = range.start;
+            for pass in passes(&range) {
+                assert_eq!(pass.start, next);
+                assert!(pass.end - pass.start <= PASS_SPP && !pass.is_empty());
+                next = pass.end;
+            }
+            assert_eq!(next, range.end);
+        }
+    }
+}

@@ -1,1 +1,74 @@
-//! Skeleton: being written.
+//! Everything that paths are traced through, committed and immutable.
+
+use crate::camera::{Camera, Filter};
+use crate::compile::geometry::Geometry;
+use crate::film::Bounds;
+use crate::interaction::SurfaceInteraction;
+use crate::light::Lights;
+use crate::material::{Materials, Shading, Surface};
+use crate::math::Rgb;
+use crate::scene::description::Integrator;
+use crate::texture::{TexturePoint, Textures};
+
+/// A compiled scene. Nothing in it can change or fail any more.
+pub struct World {
+    /// Film points to rays.
+    pub camera: Camera,
+    /// Sample offsets within a pixel.
+    pub filter: Filter,
+    /// Size of the frame and of the part to render, and how the sensor responds.
+    pub sensor: Sensor,
+    /// Committed geometry and its surfaces.
+    pub geometry: Geometry,
+    /// Textures.
+    pub textures: Textures,
+    /// Materials.
+    pub materials: Materials,
+    /// Lights.
+    pub lights: Lights,
+    /// Limits of transport.
+    pub integrator: Integrator,
+}
+
+/// The film's frame and response.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensor {
+    /// Width and height of the frame in pixels.
+    pub resolution: [u32; 2],
+    /// The pixels to render.
+    pub bounds: Bounds,
+    /// Film RGB from scene RGB.
+    pub response: glam::Mat3,
+    /// Largest component of a sample; infinite unless the scene asks for clamping.
+    pub max_component: f32,
+}
+
+impl Sensor {
+    /// Film RGB of a sample's radiance.
+    pub fn expose(&self, radiance: Rgb) -> Rgb {
+        let exposed = self.response * radiance;
+        let largest = exposed.max_element();
+        if largest > self.max_component { exposed * (self.max_component / largest) } else { exposed }
+    }
+}
+
+impl World {
+    /// The material at a hit, ready to scatter; `None` at an interface that is no surface.
+    ///
+    /// `cone_radius`: of the path's cone at the hit, world units.
+    #[inline]
+    pub fn shade(&self, vertex: &SurfaceInteraction, cone_radius: f32) -> Option<Shading<'_>> {
+        let id = self.geometry.material(vertex);
+        // What a material does not look at is not computed: most are one constant and need neither.
+        let needs = self.materials.needs(id);
+        let surface = Surface {
+            texture_point: if needs.texture_point { vertex.texture_point(cone_radius) } else { TexturePoint::default() },
+            ng: vertex.ng,
+            ns: vertex.ns,
+            dpdu: vertex.dpdu,
+            dpdv: vertex.dpdv,
+            wo: vertex.wo,
+        };
+        self.materials.shade(id, &surface, &self.textures)
+    }
+}

@@ -1,1 +1,95 @@
-//! Skeleton: being written.
+//! Description → world: the last place that may fail on input.
+
+pub mod geometry;
+
+use crate::camera::{self, Camera, Filter};
+use crate::light::Lights;
+use crate::material::Materials;
+use crate::scene::{Diagnostic, Scene, Severity, SourceMap, Span};
+use crate::texture::Textures;
+use crate::world::{Sensor, World};
+
+/// What keeps a description from becoming a world.
+#[derive(Debug)]
+pub enum CompileError {
+    /// Everything that is wrong with the scene, and the warnings so far.
+    Scene(Vec<Diagnostic>),
+    /// Embree failed.
+    Embree(embree::Error),
+}
+
+/// Messages with their places, collected over all stages so that a user sees every error at once.
+struct Report<'a> {
+    sources: &'a SourceMap,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Report<'_> {
+    fn errors(&mut self, messages: impl IntoIterator<Item = (Span, String)>) {
+        self.diagnostics.extend(messages.into_iter().map(|(span, message)| self.sources.error(span, message)));
+    }
+
+    fn warnings(&mut self, messages: impl IntoIterator<Item = (Span, String)>) {
+        self.diagnostics.extend(messages.into_iter().map(|(span, message)| self.sources.warning(span, message)));
+    }
+
+    /// The stage's result, or `None` with its errors noted.
+    fn keep<T>(&mut self, result: Result<(T, Vec<(Span, String)>), Vec<(Span, String)>>) -> Option<T> {
+        match result {
+            Ok((value, warnings)) => {
+                self.warnings(warnings);
+                Some(value)
+            }
+            Err(errors) => {
+                self.errors(errors);
+                None
+            }
+        }
+    }
+}
+
+/// Builds the world of a description, and says what in it will not look as described.
+///
+/// # Errors
+/// All that is wrong with the description, not the first of it.
+pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagnostic>), CompileError> {
+    let mut report = Report { sources: &scene.sources, diagnostics: Vec::new() };
+    let sensor = sensor(scene, &mut report);
+    let camera = Camera::build(&scene.camera, scene.film.resolution).map_err(|why| vec![(scene.camera.span, why)]);
+    let camera = report.keep(camera.map(|camera| (camera, Vec::new())));
+    let textures = report.keep(Textures::build(&scene.textures));
+    let geometry = report.keep(geometry::build(scene, device, textures.as_ref()).map_err(CompileError::Embree)?);
+    let materials = textures.as_ref().and_then(|textures| report.keep(Materials::build(&scene.materials, textures)));
+    let (geometry, emitters) = geometry.unzip();
+    let lights = geometry.as_ref().zip(emitters).and_then(|(geometry, emitters)| {
+        report.keep(Lights::build(&scene.lights, &scene.area_lights, emitters, geometry.bounds()))
+    });
+    match (sensor, camera, textures, geometry, materials, lights) {
+        (Some(sensor), Some(camera), Some(textures), Some(geometry), Some(materials), Some(lights)) => {
+            let filter = Filter::build(&scene.filter);
+            let integrator = scene.integrator;
+            let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator };
+            Ok((world, report.diagnostics))
+        }
+        _ => {
+            debug_assert!(report.diagnostics.iter().any(|d| d.severity == Severity::Error));
+            Err(CompileError::Scene(report.diagnostics))
+        }
+    }
+}
+
+fn sensor(scene: &Scene, report: &mut Report<'_>) -> Option<Sensor> {
+    let film = &scene.film;
+    match camera::pixel_bounds(film) {
+        Ok(bounds) => Some(Sensor {
+            resolution: film.resolution,
+            bounds,
+            response: film.sensor,
+            max_component: film.max_component_value,
+        }),
+        Err(why) => {
+            report.errors([(film.span, why)]);
+            None
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The image that a film shows.
+
+use super::{Film, Pixel};
+
+/// One channel of an image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// EXR name.
+    pub name: String,
+    /// Stored in 32 bits rather than 16.
+    pub float: bool,
+}
+
+/// Pixels by channel, row by row from the top: `values[(y * width + x) * channels + c]` over the film's bounds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Channels, in order.
+    pub channels: Vec<Channel>,
+    /// Values.
+    pub values: Vec<f32>,
+    /// Pixels that a filter's negative lobes had made negative, and that are written as 0.
+    pub clamped_negative: u64,
+    /// Values too large for 16 bits, written as the largest one.
+    pub clamped_half: u64,
+}
+
+/// The largest finite half float: above it, conversion would write infinity.
+const HALF_MAX: f32 = 65504.0;
+
+impl Film {
+    /// The image of all sums so far: `R G B A` as halves, then the auxiliary channels as floats.
+    pub fn image(&self) -> Image {
+        let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0, clamped_half: 0 };
+        let bounds = self.bounds();
+        image.values.reserve_exact(bounds.area() as usize * image.channels.len());
+        for y in bounds.min[1]..bounds.max[1] {
+            for x in bounds.min[0]..bounds.max[0] {
+                image.push_radiance(self.pixel([x, y]));
+                self.push_auxiliary([x, y], &mut image.values);
+            }
+        }
+        image
+    }
+
+    fn channels(&self) -> Vec<Channel> {
+        let aovs = self.aovs();
+        let mut channels: Vec<Channel> =
+            ["R", "G", "B", "A"].map(|name| Channel { name: name.into(), float: false }).into();
+        let mut add = |wanted: bool, names: &[&str]| {
+            if wanted {
+                channels.extend(names.iter().map(|name| Channel { name: (*name).into(), float: true }));
+            }
+        };
+        add(aovs.albedo, &["albedo.R", "albedo.G", "albedo.B"]);
+        add(aovs.normal, &["N.X", "N.Y", "N.Z"]);
+        add(aovs.geometric_normal, &["Ng.X", "Ng.Y", "Ng.Z"]);
+        add(aovs.position, &["P.X", "P.Y", "P.Z"]);
+        add(aovs.depth, &["depth.Z"]);
+        add(aovs.variance, &["variance.R", "variance.G", "variance.B"]);
+        add(aovs.sample_count, &["sampleCount"]);
+        channels
+    }
+
+    fn push_auxiliary(&self, at: [u32; 2], values: &mut Vec<f32>) {
+        let (aovs, pixel) = (self.aovs(), self.pixel(at));
+        if let Some(sums) = self.auxiliary(at) {
+            // Albedo and normals fade to zero where nothing is seen, as denoisers expect. A position or a distance
+            // must not: it is the mean over the samples that have one.
+            let all = 1.0 / pixel.count.max(1) as f64;
+            let hits = 1.0 / sums.hits.max(1) as f64;
+            let vectors = [
+                (aovs.albedo, sums.albedo * all),
+                (aovs.normal, sums.ns * all),
+                (aovs.geometric_normal, sums.ng * all),
+                (aovs.position, sums.p * hits),
+            ];
+            for (_, vector) in vectors.iter().filter(|(wanted, _)| *wanted) {
+                values.extend(vector.as_vec3().to_array());
+            }
+            if aovs.depth {
+                values.push(if sums.hits > 0 { (sums.depth * hits) as f32 } else { f32::INFINITY });
+            }
+        }
+        if aovs.variance {
+            values.extend(pixel.sample_variance().as_vec3().to_array());
+        }
+        if aovs.sample_count {
+            values.push(pixel.count as f32);
+        }
+    }
+}
+
+impl Image {
+    fn push_radiance(&mut self, pixel: &Pixel) {
+        let mean = pixel.mean().as_vec3();
+        self.clamped_negative += u64::from(mean.min_element() < 0.0);
+        for value in mean.to_array() {
+            self.clamped_half += u64::from(value > HALF_MAX);
+            self.values.push(value.clamp(0.0, HALF_MAX));
+        }
+        self.values.push((pixel.mean_alpha() as f32).clamp(0.0, 1.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{AovSet, Bounds};
+    use super::*;
+    use crate::math::Rgb;
+
+    #[test]
+    fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {
+        let mut film = Film::new([3, 2], Bounds::full([3, 2]), AovSet::all());
+        film.tiles()[0].for_each(|_, pixel, _| {
+            pixel.add(Rgb::new(2.0, 1.0e9, 0.0), 1.0, 1.0);
+            pixel.add(Rgb::new(6.0, 0.0, 0.0), 1.0, -0.5);
+        });
+        let image = film.image();
+        assert_eq!(image.values.len(), 6 * image.channels.len());
+        assert_eq!(image.clamped_negative, 6);
+        assert_eq!(image.clamped_half, 6);
+        assert_eq!(image.values[..3], [0.0, HALF_MAX, 0.0]);
+    }
+}

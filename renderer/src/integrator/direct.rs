@@ -1,0 +1,92 @@
+//! Light that reaches a vertex directly: by a light sample, or because the path ran into the light.
+
+use super::{Counters, Queries};
+use crate::bsdf::Bsdf;
+use crate::interaction::SurfaceInteraction;
+use crate::light::{Receiver, Target};
+use crate::material::Shading;
+use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
+use crate::sampling::{Dimension, Numbers, Use};
+use crate::world::World;
+
+/// The last scattering event of a path, if a light sample could have chosen the direction it took.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter {
+    /// Where it happened.
+    pub receiver: Receiver,
+    /// Density of the direction, sr⁻¹.
+    pub pdf: f32,
+}
+
+/// Power heuristic (β = 2) for one sample each of two techniques: the weight of the one with density `a`.
+///
+/// The ratio is squared rather than the densities, which may overflow. **Source**: \[Veach97\] section 9.2.4.
+pub fn power_heuristic(a: f32, b: f32) -> f32 {
+    let ratio = b / a;
+    1.0 / (1.0 + ratio * ratio)
+}
+
+/// Emission of the surface at `vertex` towards where the path came from, weighted against the light sample at `last`.
+pub fn emitted(world: &World, vertex: &SurfaceInteraction, last: Option<&Scatter>) -> Rgb {
+    let Some(emitter) = world.geometry.emitter(vertex) else { return Rgb::ZERO };
+    let radiance = world.lights.emitted(emitter, vertex.uv, vertex.ng, vertex.wo);
+    match last {
+        Some(last) if radiance != Rgb::ZERO => {
+            let light_pdf = world.lights.emitter_pdf(emitter, &last.receiver, vertex.point.p, vertex.ng);
+            radiance * power_heuristic(last.pdf, light_pdf)
+        }
+        _ => radiance,
+    }
+}
+
+/// Radiance that a light sample sends by way of `vertex` along `wo`, weighted against the BSDF sample.
+pub fn estimate<Q: Queries>(
+    world: &World,
+    queries: &Q,
+    vertex: &SurfaceInteraction,
+    shading: &Shading<'_>,
+    wo: LocalDir,
+    numbers: &Numbers,
+    bounce: u32,
+    counters: &mut Counters,
+) -> Rgb {
+    let receiver = receiver(vertex, &shading.bsdf, shading.frame.n);
+    let u_select = numbers.d1(Dimension::at(bounce, Use::LightSelect));
+    let Some(light) = world.lights.sample(&receiver, u_select, numbers.d2(Dimension::at(bounce, Use::Light))) else {
+        return Rgb::ZERO;
+    };
+    let (f, bsdf_pdf) = shading.bsdf.eval_pdf(wo, shading.frame.to_local(light.wi));
+    if f == Rgb::ZERO {
+        return Rgb::ZERO;
+    }
+    let segment = match light.target {
+        Target::Surface { point, n } => spawn_segment(vertex.point, vertex.ng, point, n),
+        Target::Point(p) => spawn_segment(vertex.point, vertex.ng, PointWithError::exact(p), Rgb::ZERO),
+        Target::Infinite => spawn_ray(vertex.point, vertex.ng, light.wi),
+    };
+    counters.shadow_rays += 1;
+    if queries.occluded(&segment) {
+        return Rgb::ZERO;
+    }
+    let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, bsdf_pdf) };
+    f * light.radiance * (weight / light.pdf)
+}
+
+/// The vertex as lights see it. A surface that transmits receives from both sides, which a normal of zero says.
+pub fn receiver(vertex: &SurfaceInteraction, bsdf: &Bsdf<'_>, ns: glam::Vec3) -> Receiver {
+    let n = if bsdf.is_transmissive() { glam::Vec3::ZERO } else { ns };
+    Receiver { p: vertex.point.p, n: if n.dot(vertex.wo) < 0.0 { -n } else { n } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power_heuristic;
+
+    #[test]
+    fn the_weights_of_both_techniques_sum_to_one_at_the_extremes() {
+        for (a, b) in [(1.0f32, 3.0f32), (1e-30, 1e30), (1e30, 1e-30), (1e38, 1e38), (2.0, 0.0)] {
+            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6, "{a} {b}");
+        }
+        assert_eq!(power_heuristic(f32::MIN_POSITIVE, f32::MAX), 0.0);
+    }
+}

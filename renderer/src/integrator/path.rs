@@ -1,0 +1,152 @@
+//! The path loop.
+
+use glam::Vec3;
+
+use super::direct::{self, Scatter};
+use super::{Counters, Queries, roulette};
+use crate::bsdf::BsdfSample;
+use crate::camera::CameraRay;
+use crate::film::{FirstHit, Sample};
+use crate::interaction::SurfaceInteraction;
+use crate::material::Shading;
+use crate::math::{Ray, Rgb, spawn_ray};
+use crate::sampling::{Dimension, Numbers, Use};
+use crate::world::World;
+
+/// Radiance along one camera ray, by unidirectional path tracing with a light sample at every vertex.
+///
+/// Both ways to reach a light, by sampling the light and by sampling the BSDF, are weighted by the power heuristic.
+/// `first_hit` asks for the auxiliary values of the first hit. The result is a pure function of the world, the camera
+/// ray and the numbers.
+///
+/// **Source**: \[Kajiya86\]; \[Veach97\] chapter 9 for the weights.
+pub fn trace<Q: Queries>(
+    world: &World,
+    queries: &Q,
+    camera: &CameraRay,
+    numbers: &Numbers,
+    first_hit: bool,
+    counters: &mut Counters,
+) -> Sample {
+    let mut path = Path::new(camera);
+    let mut sample = Sample::default();
+    counters.camera_rays += 1;
+    loop {
+        // Where the path goes next, and the light it runs into there.
+        counters.closest_hit_rays += 1;
+        let Some(hit) = queries.intersect(&path.ray) else {
+            path.radiance += path.beta * world.lights.escaped(path.ray.direction, path.receiver(), path.pdf());
+            break;
+        };
+        let vertex = world.geometry.interaction(&path.ray, &hit);
+        path.cone_radius += path.cone_spread * vertex.t;
+        path.radiance += path.beta * direct::emitted(world, &vertex, path.last.as_ref());
+        if path.bounce == world.integrator.max_depth {
+            break;
+        }
+
+        // The surface there; an interface between media is none.
+        let Some(mut shading) = world.shade(&vertex, path.cone_radius) else {
+            path.ray = spawn_ray(vertex.point, vertex.ng, path.ray.direction);
+            continue;
+        };
+        if world.integrator.regularize && path.roughened {
+            shading.bsdf = shading.bsdf.regularized();
+        }
+        let wo = shading.frame.to_local(vertex.wo);
+        if first_hit && path.bounce == 0 {
+            let albedo = shading.bsdf.albedo(wo);
+            sample.first = FirstHit { albedo, ns: shading.frame.n, ng: vertex.ng, p: vertex.point.p, depth: vertex.t };
+        }
+        sample.alpha = 1.0;
+
+        // Light that a light sample brings, and the direction in which the path goes on.
+        if !shading.bsdf.is_specular() {
+            path.radiance +=
+                path.beta * direct::estimate(world, queries, &vertex, &shading, wo, numbers, path.bounce, counters);
+        }
+        let u_lobe = numbers.d1(Dimension::at(path.bounce, Use::Lobe));
+        let u = numbers.d2(Dimension::at(path.bounce, Use::Bsdf));
+        let Some(next) = shading.bsdf.sample(wo, u_lobe, u) else { break };
+        path.scatter(&vertex, &shading, &next);
+        counters.scatterings += 1;
+
+        let u = numbers.d1(Dimension::at(path.bounce, Use::Roulette));
+        let Some(worth) = roulette::survive(path.beta.max_element() * path.eta_scale, path.bounce, u) else { break };
+        path.beta *= worth;
+    }
+    sample.radiance = path.radiance;
+    sample
+}
+
+/// What a path carries from vertex to vertex.
+struct Path {
+    /// Radiance found so far, along the camera ray.
+    radiance: Rgb,
+    /// Product of f cosθ / pdf over the vertices so far.
+    beta: Rgb,
+    /// The ray to the next vertex.
+    ray: Ray,
+    /// Scattering events so far; interfaces do not count.
+    bounce: u32,
+    /// The last scattering, `None` at the camera and after a delta lobe: no light sample could have gone this way.
+    last: Option<Scatter>,
+    /// Product of η² over the refractions so far, undoing their scaling of radiance.
+    eta_scale: f32,
+    /// Some lobe so far was not a delta: regularisation may begin.
+    roughened: bool,
+    /// Radius of the cone of rays that this path stands for, at the current vertex, in world units.
+    cone_radius: f32,
+    /// Growth of that radius per unit of distance.
+    cone_spread: f32,
+}
+
+/// A scattered path stands for this share of the lobe it was drawn from: sixteen paths through a pixel, each with a cone
+/// of a sixteenth of 1/pdf, tile the lobe. Only texture filtering depends on it, and with other numbers of samples it is
+/// a little blunter or sharper than it might be.
+const LOBE_SHARE: f32 = 1.0 / 16.0;
+
+impl Path {
+    fn new(camera: &CameraRay) -> Self {
+        Self {
+            radiance: Rgb::ZERO,
+            beta: Rgb::ONE,
+            ray: camera.ray,
+            bounce: 0,
+            last: None,
+            eta_scale: 1.0,
+            roughened: false,
+            cone_radius: camera.radius,
+            cone_spread: camera.spread,
+        }
+    }
+
+    fn receiver(&self) -> Option<&crate::light::Receiver> {
+        self.last.as_ref().map(|last| &last.receiver)
+    }
+
+    fn pdf(&self) -> f32 {
+        self.last.map_or(0.0, |last| last.pdf)
+    }
+
+    /// Goes on from `vertex` in the direction of `next`.
+    fn scatter(&mut self, vertex: &SurfaceInteraction, shading: &Shading<'_>, next: &BsdfSample) {
+        let wi: Vec3 = shading.frame.to_world(next.wi);
+        self.beta *= next.weight;
+        self.ray = spawn_ray(vertex.point, vertex.ng, wi);
+        self.bounce += 1;
+        if next.transmission {
+            self.eta_scale *= next.eta * next.eta;
+        }
+        if next.specular {
+            self.last = None;
+        } else {
+            let receiver = direct::receiver(vertex, &shading.bsdf, shading.frame.n);
+            self.last = Some(Scatter { receiver, pdf: next.pdf });
+            self.roughened = true;
+            // A cone of solid angle Ω has the spread √(Ω/π) for small Ω; capped at that of a quarter sphere.
+            let spread = (LOBE_SHARE / (std::f32::consts::PI * next.pdf)).sqrt().min(1.0);
+            self.cone_spread = self.cone_spread.max(spread);
+        }
+    }
+}
