@@ -1,1 +1,6 @@
-//! Support shared by the whole-renderer tests.
+//! Support shared by the whole-renderer tests and benchmarks.
+#![forbid(unsafe_code)]
+
+pub mod image;
+pub mod render;
+pub mod shared;
