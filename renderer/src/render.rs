@@ -124,8 +124,6 @@ pub struct FrameDescription {
     pub scene_hash: u64,
     /// Camera space from world space.
     pub camera_from_world: glam::DMat4,
-    /// Screen space, normalised to [0, 1]², from world space.
-    pub ndc_from_world: Option<glam::DMat4>,
     /// The output that the scene names.
     pub filename: Option<PathBuf>,
 }
@@ -236,7 +234,6 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         sample_range_asked: asked,
         scene_hash: description.sources.hash(),
         camera_from_world: description.camera.world_from_camera.inverse().matrix(),
-        ndc_from_world: world.camera.ndc_from_world(),
         filename: description.film.filename.clone(),
     };
     Ok(Prepared { world, description, aovs, statistics, device })

@@ -2,7 +2,8 @@
 
 pub mod geometry;
 
-use crate::camera::{self, Camera, Filter};
+use crate::camera::{Camera, CameraError, Filter, rendered_pixels};
+use crate::film::Bounds;
 use crate::light::Lights;
 use crate::material::Materials;
 use crate::scene::{Diagnostic, Scene, Severity, SourceMap, Span};
@@ -33,6 +34,11 @@ impl Report<'_> {
         self.diagnostics.extend(messages.into_iter().map(|(span, message)| self.sources.warning(span, message)));
     }
 
+    /// The camera or filter, or `None` with its error noted; `otherwise` is the place of an error that names none.
+    fn camera<T>(&mut self, result: Result<T, CameraError>, otherwise: Span) -> Option<T> {
+        result.map_err(|error| self.errors([(error.span.unwrap_or(otherwise), error.message)])).ok()
+    }
+
     /// The stage's result, or `None` with its errors noted.
     fn keep<T>(&mut self, result: Result<(T, Vec<(Span, String)>), Vec<(Span, String)>>) -> Option<T> {
         match result {
@@ -55,8 +61,8 @@ impl Report<'_> {
 pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagnostic>), CompileError> {
     let mut report = Report { sources: &scene.sources, diagnostics: Vec::new() };
     let sensor = sensor(scene, &mut report);
-    let camera = Camera::build(&scene.camera, scene.film.resolution).map_err(|why| vec![(scene.camera.span, why)]);
-    let camera = report.keep(camera.map(|camera| (camera, Vec::new())));
+    let camera = report.camera(Camera::build(&scene.camera, scene.film.resolution), scene.camera.span);
+    let filter = report.camera(Filter::build(&scene.filter), scene.film.span);
     let textures = report.keep(Textures::build(&scene.textures));
     let geometry = report.keep(geometry::build(scene, device, textures.as_ref()).map_err(CompileError::Embree)?);
     let materials = textures.as_ref().and_then(|textures| report.keep(Materials::build(&scene.materials, textures)));
@@ -64,9 +70,16 @@ pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagn
     let lights = geometry.as_ref().zip(emitters).and_then(|(geometry, emitters)| {
         report.keep(Lights::build(&scene.lights, &scene.area_lights, emitters, geometry.bounds()))
     });
-    match (sensor, camera, textures, geometry, materials, lights) {
-        (Some(sensor), Some(camera), Some(textures), Some(geometry), Some(materials), Some(lights)) => {
-            let filter = Filter::build(&scene.filter);
+    match (sensor, camera, filter, textures, geometry, materials, lights) {
+        (
+            Some(sensor),
+            Some(camera),
+            Some(filter),
+            Some(textures),
+            Some(geometry),
+            Some(materials),
+            Some(lights),
+        ) => {
             let integrator = scene.integrator;
             let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator };
             Ok((world, report.diagnostics))
@@ -80,16 +93,14 @@ pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagn
 
 fn sensor(scene: &Scene, report: &mut Report<'_>) -> Option<Sensor> {
     let film = &scene.film;
-    match camera::pixel_bounds(film) {
-        Ok(bounds) => Some(Sensor {
-            resolution: film.resolution,
-            bounds,
-            response: film.sensor,
-            max_component: film.max_component_value,
-        }),
-        Err(why) => {
-            report.errors([(film.span, why)]);
-            None
-        }
-    }
+    let Some([min, max]) = rendered_pixels(film.resolution, film.crop_window, film.pixel_bounds) else {
+        report.errors([(film.span, "the crop window or pixel bounds leave no pixel of the frame to render".into())]);
+        return None;
+    };
+    Some(Sensor {
+        resolution: film.resolution,
+        bounds: Bounds { min, max },
+        response: film.sensor,
+        max_component: film.max_component_value,
+    })
 }
