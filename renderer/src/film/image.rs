@@ -1,6 +1,7 @@
 //! The image that a film shows.
 
 use super::{Film, Pixel};
+use crate::math::Rgb;
 
 /// One channel of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,17 +21,12 @@ pub struct Image {
     pub values: Vec<f32>,
     /// Pixels that a filter's negative lobes had made negative, and that are written as 0.
     pub clamped_negative: u64,
-    /// Values too large for 16 bits, written as the largest one.
-    pub clamped_half: u64,
 }
-
-/// The largest finite half float: above it, conversion would write infinity.
-const HALF_MAX: f32 = 65504.0;
 
 impl Film {
     /// The image of all sums so far: `R G B A` as halves, then the auxiliary channels as floats.
     pub fn image(&self) -> Image {
-        let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0, clamped_half: 0 };
+        let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0 };
         let bounds = self.bounds();
         image.values.reserve_exact(bounds.area() as usize * image.channels.len());
         for y in bounds.min[1]..bounds.max[1] {
@@ -94,10 +90,7 @@ impl Image {
     fn push_radiance(&mut self, pixel: &Pixel) {
         let mean = pixel.mean().as_vec3();
         self.clamped_negative += u64::from(mean.min_element() < 0.0);
-        for value in mean.to_array() {
-            self.clamped_half += u64::from(value > HALF_MAX);
-            self.values.push(value.clamp(0.0, HALF_MAX));
-        }
+        self.values.extend(mean.max(Rgb::ZERO).to_array());
         self.values.push((pixel.mean_alpha() as f32).clamp(0.0, 1.0));
     }
 }
@@ -106,7 +99,6 @@ impl Image {
 mod tests {
     use super::super::{AovSet, Bounds};
     use super::*;
-    use crate::math::Rgb;
 
     #[test]
     fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {
@@ -118,7 +110,6 @@ mod tests {
         let image = film.image();
         assert_eq!(image.values.len(), 6 * image.channels.len());
         assert_eq!(image.clamped_negative, 6);
-        assert_eq!(image.clamped_half, 6);
-        assert_eq!(image.values[..3], [0.0, HALF_MAX, 0.0]);
+        assert_eq!(image.values[..3], [0.0, 5.0e8, 0.0]);
     }
 }

@@ -1,0 +1,135 @@
+//! A film as an EXR file.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use oiio::{Attribute, Channel, Compression, FileFormat, Format, Output, Window};
+
+use super::Film;
+
+/// What keeps an image from being written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// OpenImageIO says why.
+    #[error("cannot write {}: {why}", path.display())]
+    Image {
+        /// The file asked for.
+        path: PathBuf,
+        /// The reason.
+        why: oiio::Error,
+    },
+    /// The system says why.
+    #[error("cannot write {}: {why}", path.display())]
+    File {
+        /// The file asked for.
+        path: PathBuf,
+        /// The reason.
+        why: io::Error,
+    },
+}
+
+/// What was lost on the way to the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Pixels whose value the filter's negative lobes had made negative; written as 0.
+    pub clamped_negative: u64,
+    /// Values too large for 16 bits; written as the largest that fits.
+    pub clamped_half: u64,
+}
+
+/// Writes the film's image to `path`, with `attributes` as its metadata.
+///
+/// The file appears under its name only when it is whole: it is written beside it as `.NAME.part-PID`, synced, and
+/// renamed. The bytes depend on the film and the attributes alone.
+///
+/// # Errors
+/// The folder is absent or not writable, or the disk is full; then there is no new file, and an old one is untouched.
+pub fn write(film: &Film, attributes: Vec<(String, Attribute)>, path: &Path) -> Result<Losses, WriteError> {
+    let image = film.image();
+    let (bounds, [width, height]) = (film.bounds(), film.resolution());
+    let file_error = |why| WriteError::File { path: path.to_owned(), why };
+    let part = part_path(path).map_err(file_error)?;
+    let output = Output {
+        path: &part,
+        file_format: FileFormat::Exr,
+        data_window: Window {
+            x: bounds.min[0] as i32,
+            y: bounds.min[1] as i32,
+            width: bounds.width() as usize,
+            height: bounds.height() as usize,
+        },
+        display_window: Window::at_origin(width as usize, height as usize),
+        channels: image
+            .channels
+            .iter()
+            .map(|channel| Channel {
+                name: channel.name.clone(),
+                format: if channel.float { Format::Float } else { Format::Half },
+            })
+            .collect(),
+        pixels: &image.values,
+        attributes,
+        compression: Compression::Zip,
+    };
+    let written = oiio::write(&output)
+        .map_err(|why| WriteError::Image { path: path.to_owned(), why })
+        .and_then(|written| publish(&part, path).map(|()| written).map_err(file_error));
+    if written.is_err() {
+        // The message that matters is the first one; what is left of the part is of no use to anybody.
+        let _ = std::fs::remove_file(&part);
+    }
+    written.map(|written| Losses { clamped_negative: image.clamped_negative, clamped_half: written.clamped })
+}
+
+/// The name under which a file is written until it is whole: in the same folder, so that renaming is atomic.
+///
+/// # Errors
+/// `path` names no file.
+pub fn part_path(path: &Path) -> io::Result<PathBuf> {
+    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"))?;
+    let part = format!(".{}.part-{}", name.to_string_lossy(), std::process::id());
+    Ok(path.with_file_name(part))
+}
+
+/// Gives a whole file its final name: its bytes are on the disk before the name is.
+///
+/// # Errors
+/// The system's.
+pub fn publish(part: &Path, path: &Path) -> io::Result<()> {
+    std::fs::File::open(part)?.sync_all()?;
+    std::fs::rename(part, path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{AovSet, Bounds};
+    use super::*;
+    use crate::math::Rgb;
+
+    #[test]
+    fn a_written_film_reads_back_and_leaves_no_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let bounds = Bounds { min: [2, 1], max: [5, 3] };
+        let mut film = Film::new([8, 4], bounds, AovSet { sample_count: true, ..AovSet::default() });
+        film.tiles()[0].for_each(|[x, y], pixel, _| pixel.add(Rgb::new(x as f32, y as f32, 0.25), 1.0, 1.0));
+        let attributes = vec![("tessera/seed".to_owned(), Attribute::Text("7".into()))];
+        write(&film, attributes.clone(), &path).unwrap();
+        let image = oiio::read(&path).unwrap();
+        assert_eq!((image.data_window.x, image.data_window.y, image.width, image.height), (2, 1, 3, 2));
+        assert_eq!((image.display_window.width, image.display_window.height), (8, 4));
+        let red = image.channel("R").unwrap();
+        assert_eq!(image.pixels[image.channels.len() + red], 3.0);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        let first = std::fs::read(&path).unwrap();
+        write(&film, attributes, &path).unwrap();
+        assert!(first == std::fs::read(&path).unwrap(), "the bytes differ from run to run");
+    }
+
+    #[test]
+    fn an_absent_folder_is_an_error_that_names_the_file() {
+        let film = Film::new([1, 1], Bounds::full([1, 1]), AovSet::default());
+        let error = write(&film, Vec::new(), Path::new("/nonexistent/folder/a.exr")).unwrap_err().to_string();
+        assert!(error.contains("/nonexistent/folder/a.exr"), "{error}");
+    }
+}
