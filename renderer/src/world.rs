@@ -28,6 +28,20 @@ pub struct World {
     pub lights: Lights,
     /// Limits of transport.
     pub integrator: Integrator,
+    /// How lights are found.
+    pub techniques: Techniques,
+}
+
+/// Which techniques find the lights. Each is unbiased; that they agree is a test of all three.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Techniques {
+    /// Light samples and BSDF samples, weighted against each other.
+    #[default]
+    Both,
+    /// Light samples alone, but for what only a delta lobe finds.
+    Lights,
+    /// BSDF samples alone, but for delta lights.
+    Bsdfs,
 }
 
 /// The film's frame and response.

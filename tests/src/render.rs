@@ -1,11 +1,16 @@
 //! Rendering a scene within a test.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use renderer::film::Film;
-use renderer::render::{Frame, Job, Unobserved, render};
+use renderer::render::{Frame, Job, RenderError, Unobserved, render};
 
 use crate::image::RgbImage;
+
+/// A scene of the project's own, by its path within `scenes/`.
+pub fn own_scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(name)
+}
 
 /// Renders `scene` with `spp` samples a pixel at `resolution`, or at its own.
 ///
@@ -15,19 +20,39 @@ pub fn quick(scene: &Path, spp: u64, resolution: Option<[u32; 2]>) -> Frame {
     run(&Job { scene: scene.to_owned(), spp: Some(spp), resolution, ..Job::default() })
 }
 
+/// Renders an own scene with some of its text replaced.
+///
+/// # Panics
+/// As [`quick`], and if the text to be replaced is not there.
+pub fn altered(name: &str, replacements: &[(&str, &str)], spp: u64) -> Frame {
+    let mut text = std::fs::read_to_string(own_scene(name)).expect("the project's own scene is there");
+    for (old, new) in replacements {
+        assert!(text.contains(old), "{name} does not contain {old}");
+        text = text.replace(old, new);
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("scene.pbrt");
+    std::fs::write(&path, text).expect("a scene in the temporary folder");
+    quick(&path, spp, None)
+}
+
 /// Renders `job`.
 ///
 /// # Panics
 /// As [`quick`].
 pub fn run(job: &Job) -> Frame {
-    render(job, &Unobserved).unwrap_or_else(|error| {
-        use renderer::render::RenderError::{Compile, Scene};
-        if let Scene(messages) | Compile(messages) = &error {
+    render(job, &Unobserved).unwrap_or_else(|error| panic!("{}", describe(&error)))
+}
+
+/// An error with all its messages.
+pub fn describe(error: &RenderError) -> String {
+    match error {
+        RenderError::Scene(messages) | RenderError::Compile(messages) => {
             let text: Vec<String> = messages.iter().map(ToString::to_string).collect();
-            panic!("{error}\n{}", text.join("\n"));
+            format!("{error}\n{}", text.join("\n"))
         }
-        panic!("{error}")
-    })
+        other => other.to_string(),
+    }
 }
 
 /// The pixels of a film, in 32 bits.
@@ -40,4 +65,21 @@ pub fn pixels(film: &Film) -> RgbImage {
         }
     }
     image
+}
+
+/// Mean over the film and the standard error of that mean, both of the green channel.
+///
+/// The error is that of independent samples; stratified ones do better, so a test with it is on the safe side.
+pub fn mean_and_error(film: &Film) -> (f64, f64) {
+    let bounds = film.bounds();
+    let (mut mean, mut variance, mut pixels) = (0.0, 0.0, 0.0);
+    for y in bounds.min[1]..bounds.max[1] {
+        for x in bounds.min[0]..bounds.max[0] {
+            let pixel = film.pixel([x, y]);
+            mean += pixel.mean().y;
+            variance += pixel.sample_variance().y / pixel.count.max(1) as f64;
+            pixels += 1.0;
+        }
+    }
+    (mean / pixels, variance.sqrt() / pixels)
 }

@@ -8,7 +8,7 @@ use crate::light::Lights;
 use crate::material::Materials;
 use crate::scene::{Diagnostic, Scene, Severity, SourceMap, Span};
 use crate::texture::Textures;
-use crate::world::{Sensor, World};
+use crate::world::{Sensor, Techniques, World};
 
 /// What keeps a description from becoming a world.
 #[derive(Debug)]
@@ -80,8 +80,8 @@ pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagn
             Some(materials),
             Some(lights),
         ) => {
-            let integrator = scene.integrator;
-            let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator };
+            let (integrator, techniques) = (scene.integrator, Techniques::default());
+            let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator, techniques };
             Ok((world, report.diagnostics))
         }
         _ => {

@@ -7,7 +7,7 @@ use crate::light::{Receiver, Target};
 use crate::material::Shading;
 use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
 use crate::sampling::{Dimension, Numbers, Use};
-use crate::world::World;
+use crate::world::{Techniques, World};
 
 /// The last scattering event of a path, if a light sample could have chosen the direction it took.
 #[derive(Clone, Copy, Debug)]
@@ -30,12 +30,22 @@ pub fn power_heuristic(a: f32, b: f32) -> f32 {
 pub fn emitted(world: &World, vertex: &SurfaceInteraction, last: Option<&Scatter>) -> Rgb {
     let Some(emitter) = world.geometry.emitter(vertex) else { return Rgb::ZERO };
     let radiance = world.lights.emitted(emitter, vertex.uv, vertex.ng, vertex.wo);
-    match last {
-        Some(last) if radiance != Rgb::ZERO => {
+    match (last, world.techniques) {
+        (Some(last), Techniques::Both) if radiance != Rgb::ZERO => {
             let light_pdf = world.lights.emitter_pdf(emitter, &last.receiver, vertex.point.p, vertex.ng);
             radiance * power_heuristic(last.pdf, light_pdf)
         }
+        (Some(_), Techniques::Lights) => Rgb::ZERO,
         _ => radiance,
+    }
+}
+
+/// Radiance of the lights at infinity that a path which left the scene along `direction` runs into, weighted likewise.
+pub fn escaped(world: &World, direction: glam::Vec3, last: Option<&Scatter>) -> Rgb {
+    match (last, world.techniques) {
+        (Some(last), Techniques::Both) => world.lights.escaped(direction, Some(&last.receiver), last.pdf),
+        (Some(_), Techniques::Lights) => Rgb::ZERO,
+        _ => world.lights.escaped(direction, None, 0.0),
     }
 }
 
@@ -68,7 +78,11 @@ pub fn estimate<Q: Queries>(
     if queries.occluded(&segment) {
         return Rgb::ZERO;
     }
-    let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, bsdf_pdf) };
+    let weight = match world.techniques {
+        Techniques::Both if !light.delta => power_heuristic(light.pdf, bsdf_pdf),
+        Techniques::Bsdfs if !light.delta => 0.0,
+        _ => 1.0,
+    };
     f * light.radiance * (weight / light.pdf)
 }
 

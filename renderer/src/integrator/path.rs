@@ -35,7 +35,7 @@ pub fn trace<Q: Queries>(
         // Where the path goes next, and the light it runs into there.
         counters.closest_hit_rays += 1;
         let Some(hit) = queries.intersect(&path.ray) else {
-            path.radiance += path.beta * world.lights.escaped(path.ray.direction, path.receiver(), path.pdf());
+            path.radiance += path.beta * direct::escaped(world, path.ray.direction, path.last.as_ref());
             break;
         };
         let vertex = world.geometry.interaction(&path.ray, &hit);
@@ -119,14 +119,6 @@ impl Path {
             cone_radius: camera.radius,
             cone_spread: camera.spread,
         }
-    }
-
-    fn receiver(&self) -> Option<&crate::light::Receiver> {
-        self.last.as_ref().map(|last| &last.receiver)
-    }
-
-    fn pdf(&self) -> f32 {
-        self.last.map_or(0.0, |last| last.pdf)
     }
 
     /// Goes on from `vertex` in the direction of `next`.

@@ -1,0 +1,34 @@
+//! Scenes whose one value is known in closed form: the derivation is in each scene's file.
+
+use renderer::render::{Job, Unobserved, prepare, thread_pool, trace};
+use renderer::world::Techniques;
+use tests::render::{mean_and_error, own_scene};
+
+/// As in the furnace test.
+const Z: f64 = 4.4;
+
+fn value(scene: &str, techniques: Techniques) -> (f64, f64) {
+    let job = Job { scene: own_scene(scene), ..Job::default() };
+    let frame = thread_pool(0).unwrap().install(|| {
+        let mut prepared = prepare(&job, &Unobserved).unwrap_or_else(|e| panic!("{}", tests::render::describe(&e)));
+        prepared.world.techniques = techniques;
+        trace(prepared, None, &Unobserved)
+    });
+    mean_and_error(&frame.film)
+}
+
+fn check(scene: &str, techniques: Techniques, expected: f64) {
+    let (mean, error) = value(scene, techniques);
+    println!("{scene} {techniques:?}: {mean:.6} ± {error:.6}, expected {expected:.6}");
+    // 2e-5: the film is not a point, see the scenes.
+    assert!((mean - expected).abs() <= Z * error + 2e-5 * expected, "{scene}: {mean} ± {error} is not {expected}");
+}
+
+#[test]
+fn irradiance_of_simple_lights_is_that_of_the_textbook() {
+    check("analytic/point-light.pbrt", Techniques::Both, 0.040_743_7);
+    for techniques in [Techniques::Both, Techniques::Lights, Techniques::Bsdfs] {
+        check("analytic/sphere-light.pbrt", techniques, 0.1125);
+        check("analytic/square-light.pbrt", techniques, 1.939_479_6);
+    }
+}
