@@ -12,7 +12,7 @@ use crate::film::{AovSet, Film, Tile};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
-use crate::world::World;
+use crate::world::{Techniques, World};
 
 /// What to render, and what of the scene file to override.
 #[derive(Clone, Debug, Default)]
@@ -37,6 +37,8 @@ pub struct Job {
     pub aovs: AovSet,
     /// Stop at the end of the pass in which this time is over.
     pub time_limit: Option<Duration>,
+    /// How lights are found: a diagnostic.
+    pub techniques: Techniques,
 }
 
 /// What a job is doing.
@@ -219,7 +221,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     observer.phase(Phase::Compile);
     let start = Instant::now();
     let device = embree::Device::new(&embree::DeviceOptions::default())?;
-    let (world, warnings) = compile::world(&description, &device).map_err(|errors| match errors {
+    let (world, warnings) = compile::world(&description, &device, job.techniques).map_err(|errors| match errors {
         CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
         CompileError::Embree(error) => RenderError::Embree(error),
     })?;

@@ -1,19 +1,15 @@
 //! Scenes whose one value is known in closed form: the derivation is in each scene's file.
 
-use renderer::render::{Job, Unobserved, prepare, thread_pool, trace};
+use renderer::render::Job;
 use renderer::world::Techniques;
-use tests::render::{mean_and_error, own_scene};
+use tests::render::{mean_and_error, own_scene, run};
 
 /// As in the furnace test.
 const Z: f64 = 4.4;
 
 fn value(scene: &str, techniques: Techniques) -> (f64, f64) {
-    let job = Job { scene: own_scene(scene), ..Job::default() };
-    let frame = thread_pool(0).unwrap().install(|| {
-        let mut prepared = prepare(&job, &Unobserved).unwrap_or_else(|e| panic!("{}", tests::render::describe(&e)));
-        prepared.world.techniques = techniques;
-        trace(prepared, None, &Unobserved)
-    });
+    let job = Job { scene: own_scene(scene), techniques, ..Job::default() };
+    let frame = run(&job);
     mean_and_error(&frame.film)
 }
 

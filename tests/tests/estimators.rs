@@ -1,16 +1,12 @@
 //! Three ways to find the lights that must agree: sampling lights, sampling BSDFs, and both.
 
-use renderer::render::{Frame, Job, Unobserved, prepare, thread_pool, trace};
+use renderer::render::{Frame, Job};
 use renderer::world::Techniques;
-use tests::render::{describe, own_scene};
+use tests::render::{own_scene, run};
 
 fn rendered(techniques: Techniques) -> Frame {
-    let job = Job { scene: own_scene("analytic/materials.pbrt"), ..Job::default() };
-    thread_pool(0).unwrap().install(|| {
-        let mut prepared = prepare(&job, &Unobserved).unwrap_or_else(|e| panic!("{}", describe(&e)));
-        prepared.world.techniques = techniques;
-        trace(prepared, None, &Unobserved)
-    })
+    let job = Job { scene: own_scene("analytic/materials.pbrt"), techniques, ..Job::default() };
+    run(&job)
 }
 
 /// Per block of 16×16 pixels, z of the difference must be below the bound that Šidák gives for all blocks and pairs at a

@@ -58,7 +58,11 @@ impl Report<'_> {
 ///
 /// # Errors
 /// All that is wrong with the description, not the first of it.
-pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagnostic>), CompileError> {
+pub fn world(
+    scene: &Scene,
+    device: &embree::Device,
+    techniques: Techniques,
+) -> Result<(World, Vec<Diagnostic>), CompileError> {
     let mut report = Report { sources: &scene.sources, diagnostics: Vec::new() };
     let sensor = sensor(scene, &mut report);
     let camera = report.camera(Camera::build(&scene.camera, scene.film.resolution), scene.camera.span);
@@ -80,7 +84,8 @@ pub fn world(scene: &Scene, device: &embree::Device) -> Result<(World, Vec<Diagn
             Some(materials),
             Some(lights),
         ) => {
-            let (integrator, techniques) = (scene.integrator, Techniques::default());
+            let integrator = scene.integrator;
+            let lights = if techniques == Techniques::Both { lights.beside_bsdf_samples() } else { lights };
             let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator, techniques };
             Ok((world, report.diagnostics))
         }

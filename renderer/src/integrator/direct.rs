@@ -1,9 +1,11 @@
 //! Light that reaches a vertex directly: by a light sample, or because the path ran into the light.
 
+use Vec3;
+
 use super::{Counters, Queries};
 use crate::bsdf::Bsdf;
 use crate::interaction::SurfaceInteraction;
-use crate::light::{Receiver, Target};
+use crate::light::{Receiver, Target, power_heuristic};
 use crate::material::Shading;
 use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
 use crate::sampling::{Dimension, Numbers, Use};
@@ -16,14 +18,6 @@ pub struct Scatter {
     pub receiver: Receiver,
     /// Density of the direction, sr⁻¹.
     pub pdf: f32,
-}
-
-/// Power heuristic (β = 2) for one sample each of two techniques: the weight of the one with density `a`.
-///
-/// The ratio is squared rather than the densities, which may overflow. **Source**: \[Veach97\] section 9.2.4.
-pub fn power_heuristic(a: f32, b: f32) -> f32 {
-    let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
 }
 
 /// Emission of the surface at `vertex` towards where the path came from, weighted against the light sample at `last`.
@@ -41,7 +35,7 @@ pub fn emitted(world: &World, vertex: &SurfaceInteraction, last: Option<&Scatter
 }
 
 /// Radiance of the lights at infinity that a path which left the scene along `direction` runs into, weighted likewise.
-pub fn escaped(world: &World, direction: glam::Vec3, last: Option<&Scatter>) -> Rgb {
+pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> Rgb {
     match (last, world.techniques) {
         (Some(last), Techniques::Both) => world.lights.escaped(direction, Some(&last.receiver), last.pdf),
         (Some(_), Techniques::Lights) => Rgb::ZERO,
@@ -71,7 +65,7 @@ pub fn estimate<Q: Queries>(
     }
     let segment = match light.target {
         Target::Surface { point, n } => spawn_segment(vertex.point, vertex.ng, point, n),
-        Target::Point(p) => spawn_segment(vertex.point, vertex.ng, PointWithError::exact(p), Rgb::ZERO),
+        Target::Point(p) => spawn_segment(vertex.point, vertex.ng, PointWithError::exact(p), Vec3::ZERO),
         Target::Infinite => spawn_ray(vertex.point, vertex.ng, light.wi),
     };
     counters.shadow_rays += 1;
@@ -87,20 +81,7 @@ pub fn estimate<Q: Queries>(
 }
 
 /// The vertex as lights see it. A surface that transmits receives from both sides, which a normal of zero says.
-pub fn receiver(vertex: &SurfaceInteraction, bsdf: &Bsdf<'_>, ns: glam::Vec3) -> Receiver {
-    let n = if bsdf.is_transmissive() { glam::Vec3::ZERO } else { ns };
+pub fn receiver(vertex: &SurfaceInteraction, bsdf: &Bsdf<'_>, ns: Vec3) -> Receiver {
+    let n = if bsdf.is_transmissive() { Vec3::ZERO } else { ns };
     Receiver { p: vertex.point.p, n: if n.dot(vertex.wo) < 0.0 { -n } else { n } }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::power_heuristic;
-
-    #[test]
-    fn the_weights_of_both_techniques_sum_to_one_at_the_extremes() {
-        for (a, b) in [(1.0f32, 3.0f32), (1e-30, 1e30), (1e30, 1e-30), (1e38, 1e38), (2.0, 0.0)] {
-            assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6, "{a} {b}");
-        }
-        assert_eq!(power_heuristic(f32::MIN_POSITIVE, f32::MAX), 0.0);
-    }
 }
