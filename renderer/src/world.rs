@@ -2,7 +2,6 @@
 
 use crate::camera::{Camera, Filter};
 use crate::compile::geometry::Geometry;
-use crate::film::Bounds;
 use crate::interaction::SurfaceInteraction;
 use crate::light::Lights;
 use crate::material::{Materials, Shading, Surface};
@@ -42,6 +41,37 @@ pub enum Techniques {
     Lights,
     /// BSDF samples alone, but for delta lights.
     Bsdfs,
+}
+
+/// A rectangle of pixels, upper ends exclusive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// First column and row.
+    pub min: [u32; 2],
+    /// One past the last column and row.
+    pub max: [u32; 2],
+}
+
+impl Bounds {
+    /// The whole of a resolution.
+    pub fn full(resolution: [u32; 2]) -> Self {
+        Self { min: [0, 0], max: resolution }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> u32 {
+        self.max[0] - self.min[0]
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.max[1] - self.min[1]
+    }
+
+    /// Number of pixels.
+    pub fn area(&self) -> u64 {
+        u64::from(self.width()) * u64::from(self.height())
+    }
 }
 
 /// The film's frame and response.

@@ -3,12 +3,11 @@
 pub mod geometry;
 
 use crate::camera::{Camera, CameraError, Filter, rendered_pixels};
-use crate::film::Bounds;
 use crate::light::Lights;
 use crate::material::Materials;
 use crate::scene::{Diagnostic, Scene, Severity, SourceMap, Span};
 use crate::texture::Textures;
-use crate::world::{Sensor, Techniques, World};
+use crate::world::{Bounds, Sensor, Techniques, World};
 
 /// What keeps a description from becoming a world.
 #[derive(Debug)]

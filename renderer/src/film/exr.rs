@@ -102,9 +102,10 @@ pub fn publish(part: &Path, path: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AovSet, Bounds};
+    use super::super::AovSet;
     use super::*;
     use crate::math::Rgb;
+    use crate::world::Bounds;
 
     #[test]
     fn a_written_film_reads_back_and_leaves_no_part() {

@@ -97,8 +97,9 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AovSet, Bounds};
+    use super::super::AovSet;
     use super::*;
+    use crate::world::Bounds;
 
     #[test]
     fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {

@@ -8,9 +8,10 @@ mod image;
 mod pixel;
 
 pub use image::{Channel, Image};
-pub use pixel::{Auxiliary, FirstHit, Pixel, Sample};
+pub use pixel::{Auxiliary, Pixel};
 
 use crate::math::Rgb;
+use crate::world::Bounds;
 
 /// Side of the square tiles that threads work on, in pixels: 256 pixels of a few paths each are some milliseconds of
 /// work, far above the cost of handing out a tile and far below that of a frame.
@@ -67,37 +68,6 @@ impl AovSet {
     /// Whether any output needs to know the first hit.
     pub fn first_hit(&self) -> bool {
         self.albedo || self.normal || self.geometric_normal || self.position || self.depth
-    }
-}
-
-/// A rectangle of pixels, upper ends exclusive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Bounds {
-    /// First column and row.
-    pub min: [u32; 2],
-    /// One past the last column and row.
-    pub max: [u32; 2],
-}
-
-impl Bounds {
-    /// The whole of a resolution.
-    pub fn full(resolution: [u32; 2]) -> Self {
-        Self { min: [0, 0], max: resolution }
-    }
-
-    /// Columns.
-    pub fn width(&self) -> u32 {
-        self.max[0] - self.min[0]
-    }
-
-    /// Rows.
-    pub fn height(&self) -> u32 {
-        self.max[1] - self.min[1]
-    }
-
-    /// Number of pixels.
-    pub fn area(&self) -> u64 {
-        u64::from(self.width()) * u64::from(self.height())
     }
 }
 

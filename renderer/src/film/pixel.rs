@@ -1,34 +1,9 @@
 //! What one pixel adds up.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
+use crate::integrator::FirstHit;
 use crate::math::Rgb;
-
-/// What a path brings to its pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
-    /// Radiance along the camera ray.
-    pub radiance: Rgb,
-    /// 1 where the camera ray met a surface, 0 where it escaped.
-    pub alpha: f32,
-    /// The first hit; left at its default where none is asked for.
-    pub first: FirstHit,
-}
-
-/// The first hit of a path, for auxiliary outputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FirstHit {
-    /// Hemispherical reflectance.
-    pub albedo: Rgb,
-    /// Shading normal.
-    pub ns: Vec3,
-    /// Geometric normal.
-    pub ng: Vec3,
-    /// Position.
-    pub p: Vec3,
-    /// Distance along the camera ray.
-    pub depth: f32,
-}
 
 /// Weighted sums of a pixel's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,10 +3,12 @@
 mod direct;
 mod path;
 mod queries;
+mod record;
 mod roulette;
 
 pub use path::trace;
 pub use queries::{AlphaTested, Opaque, Queries, Recorded, Recording};
+pub use record::{FirstHit, Sample};
 
 /// How many rays of each kind were traced, and what became of samples. Sums over pixels: the same for any threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

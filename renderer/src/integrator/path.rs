@@ -3,10 +3,9 @@
 use glam::Vec3;
 
 use super::direct::{self, Scatter};
-use super::{Counters, Queries, roulette};
+use super::{Counters, FirstHit, Queries, Sample, roulette};
 use crate::bsdf::BsdfSample;
 use crate::camera::CameraRay;
-use crate::film::{FirstHit, Sample};
 use crate::interaction::SurfaceInteraction;
 use crate::material::Shading;
 use crate::math::{Ray, Rgb, spawn_ray};

@@ -1,0 +1,31 @@
+//! What a path brings back.
+
+use glam::Vec3;
+
+use crate::math::Rgb;
+
+/// What a path brings to its pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Radiance along the camera ray.
+    pub radiance: Rgb,
+    /// 1 where the camera ray met a surface, 0 where it escaped.
+    pub alpha: f32,
+    /// The first hit; left at its default where none is asked for.
+    pub first: FirstHit,
+}
+
+/// The first hit of a path, for auxiliary outputs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FirstHit {
+    /// Hemispherical reflectance.
+    pub albedo: Rgb,
+    /// Shading normal.
+    pub ns: Vec3,
+    /// Geometric normal.
+    pub ng: Vec3,
+    /// Position.
+    pub p: Vec3,
+    /// Distance along the camera ray.
+    pub depth: f32,
+}
