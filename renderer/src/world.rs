@@ -1,8 +1,9 @@
 //! Everything that paths are traced through, committed and immutable.
 
+use glam::Vec3;
+
 use crate::camera::{Camera, Filter};
-use crate::compile::geometry::Geometry;
-use crate::interaction::SurfaceInteraction;
+use crate::interaction::{Geometry, SurfaceInteraction};
 use crate::light::Lights;
 use crate::material::{Materials, Shading, Surface};
 use crate::math::Rgb;
@@ -101,16 +102,18 @@ impl World {
     ///
     /// `cone_radius`: of the path's cone at the hit, world units.
     #[inline]
-    pub fn shade(&self, vertex: &SurfaceInteraction, cone_radius: f32) -> Option<Shading<'_>> {
+    pub fn shade(&self, vertex: &SurfaceInteraction<'_>, cone_radius: f32) -> Option<Shading<'_>> {
         let id = self.geometry.material(vertex);
         // What a material does not look at is not computed: most are one constant and need neither.
         let needs = self.materials.needs(id);
+        let (dpdu, dpdv) = if needs.tangents { vertex.tangents() } else { (Vec3::ZERO, Vec3::ZERO) };
         let surface = Surface {
             texture_point: if needs.texture_point { vertex.texture_point(cone_radius) } else { TexturePoint::default() },
+            p: vertex.point.p,
             ng: vertex.ng,
             ns: vertex.ns,
-            dpdu: vertex.dpdu,
-            dpdv: vertex.dpdv,
+            dpdu,
+            dpdv,
             wo: vertex.wo,
         };
         self.materials.shade(id, &surface, &self.textures)

@@ -42,11 +42,8 @@ fn no_material_shows_more_than_it_receives() {
         r#"Material "diffusetransmission" "rgb reflectance" [ 0.5 0.5 0.5 ] "rgb transmittance" [ 0.5 0.5 0.5 ]"#,
     ];
     for material in materials {
-        let frame = altered(
-            "furnace/sphere.pbrt",
-            &[(r#"Material "diffuse" "rgb reflectance" [ 1 1 1 ]"#, material)],
-            64,
-        );
+        let frame =
+            altered("furnace/sphere.pbrt", &[(r#"Material "diffuse" "rgb reflectance" [ 1 1 1 ]"#, material)], 64);
         let (mean, error) = mean_and_error(&frame.film);
         println!("{mean:.5} ± {error:.5}  {material}");
         assert!(mean <= 1.0 + Z * error + ROUNDING, "{mean} ± {error}: {material}");

@@ -129,6 +129,12 @@ impl Bsdf<'_> {
         }
     }
 
+    /// Some light goes through: what is below the surface matters.
+    #[inline]
+    pub fn is_transmissive(&self) -> bool {
+        matches!(self, Self::DiffuseTransmission(_) | Self::Dielectric(_) | Self::ThinDielectric(_))
+    }
+
     /// Roughened where it is smoother than alpha = 0.3, as pbrt-v4 does after a diffuse bounce. A pane stays as it is.
     pub fn regularized(self) -> Self {
         match self {

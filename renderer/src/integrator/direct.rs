@@ -21,9 +21,9 @@ pub struct Scatter {
 }
 
 /// Emission of the surface at `vertex` towards where the path came from, weighted against the light sample at `last`.
-pub fn emitted(world: &World, vertex: &SurfaceInteraction, last: Option<&Scatter>) -> Rgb {
+pub fn emitted(world: &World, vertex: &SurfaceInteraction<'_>, last: Option<&Scatter>) -> Rgb {
     let Some(emitter) = world.geometry.emitter(vertex) else { return Rgb::ZERO };
-    let radiance = world.lights.emitted(emitter, vertex.uv, vertex.ng, vertex.wo);
+    let radiance = world.lights.emitted(emitter, vertex.uv(), vertex.ng, vertex.wo);
     match (last, world.techniques) {
         (Some(last), Techniques::Both) if radiance != Rgb::ZERO => {
             let light_pdf = world.lights.emitter_pdf(emitter, &last.receiver, vertex.point.p, vertex.ng);
@@ -47,7 +47,7 @@ pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> Rgb {
 pub fn estimate<Q: Queries>(
     world: &World,
     queries: &Q,
-    vertex: &SurfaceInteraction,
+    vertex: &SurfaceInteraction<'_>,
     shading: &Shading<'_>,
     wo: LocalDir,
     numbers: &Numbers,
@@ -81,7 +81,7 @@ pub fn estimate<Q: Queries>(
 }
 
 /// The vertex as lights see it. A surface that transmits receives from both sides, which a normal of zero says.
-pub fn receiver(vertex: &SurfaceInteraction, bsdf: &Bsdf<'_>, ns: Vec3) -> Receiver {
+pub fn receiver(vertex: &SurfaceInteraction<'_>, bsdf: &Bsdf<'_>, ns: Vec3) -> Receiver {
     let n = if bsdf.is_transmissive() { Vec3::ZERO } else { ns };
     Receiver { p: vertex.point.p, n: if n.dot(vertex.wo) < 0.0 { -n } else { n } }
 }

@@ -121,7 +121,7 @@ impl Path {
     }
 
     /// Goes on from `vertex` in the direction of `next`.
-    fn scatter(&mut self, vertex: &SurfaceInteraction, shading: &Shading<'_>, next: &BsdfSample) {
+    fn scatter(&mut self, vertex: &SurfaceInteraction<'_>, shading: &Shading<'_>, next: &BsdfSample) {
         let wi: Vec3 = shading.frame.to_world(next.wi);
         self.beta *= next.weight;
         self.ray = spawn_ray(vertex.point, vertex.ng, wi);

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use embree::{CommittedScene, Hit};
 
-use crate::compile::geometry::AlphaTest;
+use crate::interaction::AlphaTest;
 use crate::math::Ray;
 
 /// Ray queries. A path loop is compiled once per implementation, so that a scene without alpha masks, say, does not pay
