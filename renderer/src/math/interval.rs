@@ -12,6 +12,17 @@ pub const fn gamma(n: u32) -> f32 {
     n as f32 * MACHINE_EPSILON / (1.0 - n as f32 * MACHINE_EPSILON)
 }
 
+/// The next float away from zero; an infinity stays. (`f32::next_up` is younger than our compiler.)
+pub fn next_away_from_zero(x: f32) -> f32 {
+    // The bits of a float without its sign count its magnitude.
+    if x.is_finite() { f32::from_bits(x.to_bits() + 1) } else { x }
+}
+
+/// The next float towards zero, which stays.
+pub fn next_towards_zero(x: f32) -> f32 {
+    if x == 0.0 { x } else { f32::from_bits(x.to_bits() - 1) }
+}
+
 /// A point that was computed with rounding, and the bound of its absolute error per axis.
 ///
 /// **Space**: whichever the producer says; world space in an interaction.
@@ -27,5 +38,20 @@ impl PointWithError {
     /// A point that is exact by definition, such as a camera or a point light.
     pub fn exact(p: Vec3) -> Self {
         Self { p, error: Vec3::ZERO }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_of_floats_are_neighbours() {
+        assert_eq!(next_away_from_zero(1.0), 1.0 + f32::EPSILON);
+        assert_eq!(next_towards_zero(1.0), 1.0 - f32::EPSILON / 2.0);
+        assert_eq!(next_away_from_zero(-1.0), -1.0 - f32::EPSILON);
+        assert_eq!(next_away_from_zero(0.0), f32::from_bits(1));
+        assert_eq!(next_away_from_zero(f32::MAX), f32::INFINITY);
+        assert_eq!(next_towards_zero(0.0), 0.0);
     }
 }

@@ -8,7 +8,7 @@ pub mod transform;
 pub mod warp;
 
 pub use frame::{Frame, LocalDir};
-pub use interval::{PointWithError, gamma};
+pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero};
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;

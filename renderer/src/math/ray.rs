@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::PointWithError;
+use super::interval::{next_away_from_zero, next_towards_zero};
 
 /// A half line or segment in world space. `direction` need not be unit; hit distances are in its units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +45,7 @@ pub fn spawn_segment(from: PointWithError, ng_from: Vec3, to: PointWithError, ng
     let origin = offset_origin(from, ng_from, to.p - from.p);
     let target = offset_origin(to, ng_to, origin - to.p);
     // Both ends are outside their surfaces; one ulp below 1 keeps the end itself open.
-    Ray { origin, direction: target - origin, t_max: 1.0_f32.next_down() }
+    Ray { origin, direction: target - origin, t_max: next_towards_zero(1.0) }
 }
 
 fn offset_origin(from: PointWithError, ng: Vec3, direction: Vec3) -> Vec3 {
@@ -52,12 +53,14 @@ fn offset_origin(from: PointWithError, ng: Vec3, direction: Vec3) -> Vec3 {
     let offset = if ng.dot(direction) < 0.0 { -ng * distance } else { ng * distance };
     let moved = from.p + offset;
     let outward = |value: f32, offset: f32| {
-        if offset > 0.0 {
-            value.next_up()
-        } else if offset < 0.0 {
-            value.next_down()
-        } else {
+        if offset == 0.0 {
             value
+        } else if value == 0.0 {
+            f32::from_bits(1).copysign(offset)
+        } else if (offset > 0.0) == (value > 0.0) {
+            next_away_from_zero(value)
+        } else {
+            next_towards_zero(value)
         }
     };
     Vec3::new(outward(moved.x, offset.x), outward(moved.y, offset.y), outward(moved.z, offset.z))
