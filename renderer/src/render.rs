@@ -83,6 +83,9 @@ pub enum RenderError {
     /// Embree does not start.
     #[error("Embree cannot be used: {0}")]
     Embree(#[from] embree::Error),
+    /// OpenImageIO does not take its settings.
+    #[error("OpenImageIO cannot be used: {0}")]
+    OpenImageIo(#[from] oiio::Error),
     /// No threads.
     #[error("cannot start {threads} render threads: {why}")]
     Threads {
@@ -201,6 +204,8 @@ pub fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, RenderError> {
 /// All that is wrong with the scene, not the first of it.
 pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderError> {
     let mut statistics = Statistics { threads: rayon::current_num_threads(), ..Statistics::default() };
+    // Images are read by our own threads, one each: OpenImageIO's pool would only contend with them.
+    oiio::set_threads(1)?;
     observer.phase(Phase::Parse);
     let start = Instant::now();
     let (mut description, warnings) = scene::pbrt::load(&job.scene).map_err(RenderError::Scene)?;
