@@ -25,6 +25,7 @@ pub use surface::{CurveSet, Mesh, PatchMesh, Primitives, Surface};
 
 use crate::math::{PointWithError, Ray};
 use crate::scene::description::MaterialId;
+use crate::texture::Textures;
 
 /// Everything that rays can meet.
 pub struct Geometry {
@@ -94,6 +95,24 @@ impl Geometry {
     /// Placed copies of objects.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
+    }
+
+    /// The test that hits must pass; `None` if every hit is real.
+    pub fn alpha_test<'w>(&'w self, textures: &'w Textures) -> Option<AlphaTest<'w>> {
+        self.scene.has_filtered_geometry().then_some(AlphaTest { geometry: self, textures })
+    }
+
+    /// Number of triangles, patches, quadrics and curve segments: with every instance counted, and in memory.
+    pub fn primitive_counts(&self) -> (u64, u64) {
+        let count = |surfaces: &[Surface]| surfaces.iter().map(|s| s.primitives.len() as u64).sum::<u64>();
+        // An object's surfaces end where the next object's begin.
+        let mut ends: Vec<usize> = self.instances.iter().map(|i| i.first_surface as usize).collect();
+        ends.push(self.surfaces.len());
+        ends.sort_unstable();
+        let object = |first: usize| first..ends[ends.partition_point(|&end| end <= first)];
+        let placed = &self.surfaces[..self.placed as usize];
+        let instanced = self.instances.iter().map(|i| count(&self.surfaces[object(i.first_surface as usize)]));
+        (count(placed) + instanced.sum::<u64>(), count(&self.surfaces))
     }
 
     /// The surface at a hit of `ray`.

@@ -159,10 +159,10 @@ pub struct Statistics {
     pub embree_bytes: u64,
     /// Bytes of the film.
     pub film_bytes: u64,
-    /// Shapes and triangles, with every instance counted, and without.
-    pub triangles: u64,
-    /// Triangles in memory.
-    pub unique_triangles: u64,
+    /// Triangles and other primitives, with every instance counted.
+    pub primitives: u64,
+    /// Of those, the ones in memory.
+    pub unique_primitives: u64,
 }
 
 /// A scene that is read and built, with what of the job it decides.
@@ -233,7 +233,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     warnings.iter().for_each(|warning| observer.warning(warning));
     statistics.compile_seconds = start.elapsed().as_secs_f64();
     statistics.embree_bytes = device.memory().peak as u64;
-    (statistics.triangles, statistics.unique_triangles) = world.geometry.triangle_counts();
+    (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
     let description = FrameDescription {
         seed,

@@ -108,7 +108,11 @@ impl World {
         let needs = self.materials.needs(id);
         let (dpdu, dpdv) = if needs.tangents { vertex.tangents() } else { (Vec3::ZERO, Vec3::ZERO) };
         let surface = Surface {
-            texture_point: if needs.texture_point { vertex.texture_point(cone_radius) } else { TexturePoint::default() },
+            texture_point: if needs.texture_point {
+                vertex.texture_point(cone_radius)
+            } else {
+                TexturePoint::default()
+            },
             p: vertex.point.p,
             ng: vertex.ng,
             ns: vertex.ns,

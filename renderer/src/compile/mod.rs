@@ -6,7 +6,7 @@ use crate::camera::{Camera, CameraError, Filter, rendered_pixels};
 use crate::light::Lights;
 use crate::material::Materials;
 use crate::scene::{Diagnostic, Scene, Severity, SourceMap, Span};
-use crate::texture::Textures;
+use crate::texture::{TextureError, Textures};
 use crate::world::{Bounds, Sensor, Techniques, World};
 
 /// What keeps a description from becoming a world.
@@ -17,6 +17,9 @@ pub enum CompileError {
     /// Embree failed.
     Embree(embree::Error),
 }
+
+/// What a stage builds, with its warnings, or all that is wrong.
+type StageResult<T> = Result<(T, Vec<(Span, String)>), Vec<(Span, String)>>;
 
 /// Messages with their places, collected over all stages so that a user sees every error at once.
 struct Report<'a> {
@@ -39,7 +42,7 @@ impl Report<'_> {
     }
 
     /// The stage's result, or `None` with its errors noted.
-    fn keep<T>(&mut self, result: Result<(T, Vec<(Span, String)>), Vec<(Span, String)>>) -> Option<T> {
+    fn keep<T>(&mut self, result: StageResult<T>) -> Option<T> {
         match result {
             Ok((value, warnings)) => {
                 self.warnings(warnings);
@@ -66,23 +69,18 @@ pub fn world(
     let sensor = sensor(scene, &mut report);
     let camera = report.camera(Camera::build(&scene.camera, scene.film.resolution), scene.camera.span);
     let filter = report.camera(Filter::build(&scene.filter), scene.film.span);
-    let textures = report.keep(Textures::build(&scene.textures));
-    let geometry = report.keep(geometry::build(scene, device, textures.as_ref()).map_err(CompileError::Embree)?);
+    let textures = report.keep(textures(scene));
+    let geometry = report.keep(
+        geometry::build(scene, device, textures.as_ref(), &geometry::Options::default())
+            .map_err(CompileError::Embree)?,
+    );
     let materials = textures.as_ref().and_then(|textures| report.keep(Materials::build(&scene.materials, textures)));
     let (geometry, emitters) = geometry.unzip();
     let lights = geometry.as_ref().zip(emitters).and_then(|(geometry, emitters)| {
         report.keep(Lights::build(&scene.lights, &scene.area_lights, emitters, geometry.bounds()))
     });
     match (sensor, camera, filter, textures, geometry, materials, lights) {
-        (
-            Some(sensor),
-            Some(camera),
-            Some(filter),
-            Some(textures),
-            Some(geometry),
-            Some(materials),
-            Some(lights),
-        ) => {
+        (Some(sensor), Some(camera), Some(filter), Some(textures), Some(geometry), Some(materials), Some(lights)) => {
             let integrator = scene.integrator;
             let lights = if techniques == Techniques::Both { lights.beside_bsdf_samples() } else { lights };
             let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator, techniques };
@@ -93,6 +91,11 @@ pub fn world(
             Err(CompileError::Scene(report.diagnostics))
         }
     }
+}
+
+fn textures(scene: &Scene) -> StageResult<Textures> {
+    let messages = |errors: Vec<TextureError>| errors.into_iter().map(|e| (e.span, e.message)).collect();
+    Textures::build(&scene.textures).map(|(textures, warnings)| (textures, messages(warnings))).map_err(messages)
 }
 
 fn sensor(scene: &Scene, report: &mut Report<'_>) -> Option<Sensor> {

@@ -119,7 +119,8 @@ impl Film {
 
     /// Bytes that a film of this shape holds.
     pub fn memory(bounds: Bounds, aovs: AovSet) -> u64 {
-        let pixels = u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
+        let pixels =
+            u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
         let first_hit = if aovs.first_hit() { size_of::<Auxiliary>() } else { 0 };
         pixels * (size_of::<Pixel>() + first_hit) as u64
     }

@@ -1,6 +1,6 @@
 //! Light that reaches a vertex directly: by a light sample, or because the path ran into the light.
 
-use Vec3;
+use glam::Vec3;
 
 use super::{Counters, Queries};
 use crate::bsdf::Bsdf;

@@ -68,8 +68,7 @@ impl Builder<'_> {
         });
         let anisotropic = kind.anisotropic();
         let bent = displacement.is_some() || normal_map.is_some();
-        let mut needs =
-            Needs { texture_point: kind.textured() || bent, tangents: anisotropic || bent };
+        let mut needs = Needs { texture_point: kind.textured() || bent, tangents: anisotropic || bent };
         if let Kind::Mix { materials, .. } = &kind {
             for part in materials.map(|id| self.built.list[id.index()].needs) {
                 needs.texture_point |= part.texture_point;
@@ -83,10 +82,9 @@ impl Builder<'_> {
         match &material.kind {
             MaterialKind::Interface => Kind::Interface,
             MaterialKind::Diffuse { reflectance } => Kind::Diffuse { reflectance: self.rgb(reflectance) },
-            MaterialKind::DiffuseTransmission { reflectance, transmittance } => Kind::DiffuseTransmission {
-                reflectance: self.rgb(reflectance),
-                transmittance: self.rgb(transmittance),
-            },
+            MaterialKind::DiffuseTransmission { reflectance, transmittance } => {
+                Kind::DiffuseTransmission { reflectance: self.rgb(reflectance), transmittance: self.rgb(transmittance) }
+            }
             MaterialKind::Conductor { conductor, roughness } => {
                 Kind::Conductor { metal: self.metal(conductor, 1.0), widths: self.widths(roughness) }
             }
@@ -119,10 +117,9 @@ impl Builder<'_> {
     fn widths(&self, roughness: &Roughness) -> Widths {
         let (u, v) = (self.textures.folded_float(&roughness.u), self.textures.folded_float(&roughness.v));
         match (&u, &v) {
-            (Value::Constant(u), Value::Constant(v)) => Widths::Constant(Ggx::new(glam::Vec2::new(
-                width(*u, roughness.remap),
-                width(*v, roughness.remap),
-            ))),
+            (Value::Constant(u), Value::Constant(v)) => {
+                Widths::Constant(Ggx::new(glam::Vec2::new(width(*u, roughness.remap), width(*v, roughness.remap))))
+            }
             _ => Widths::Textured { u, v, remap: roughness.remap },
         }
     }
@@ -227,9 +224,9 @@ impl Kind {
 
     fn anisotropic(&self) -> bool {
         match self {
-            Self::Conductor { widths, .. }
-            | Self::Dielectric { widths, .. }
-            | Self::CoatedDiffuse { widths, .. } => widths.anisotropic(),
+            Self::Conductor { widths, .. } | Self::Dielectric { widths, .. } | Self::CoatedDiffuse { widths, .. } => {
+                widths.anisotropic()
+            }
             Self::CoatedConductor { base, widths, .. } => base.anisotropic() || widths.anisotropic(),
             _ => false,
         }

@@ -62,8 +62,7 @@ fn a_material_needs_only_what_it_looks_at() {
         ..diffuse(Value::Constant(Rgb::ONE))
     };
     let bumpy = description::Material { displacement: Some(TextureId(1)), ..diffuse(Value::Constant(Rgb::ONE)) };
-    let list =
-        [diffuse(texture(0)), diffuse(texture(1)), glass(rough(0.1, 0.1)), glass(rough(0.1, 0.3)), bumpy];
+    let list = [diffuse(texture(0)), diffuse(texture(1)), glass(rough(0.1, 0.1)), glass(rough(0.1, 0.3)), bumpy];
     let built = build(&list, &textures);
     let needs: Vec<_> = (0..5).map(|id| built.needs(MaterialId(id))).map(|n| (n.texture_point, n.tangents)).collect();
     assert_eq!(needs, [(false, false), (true, false), (false, false), (false, true), (true, true)]);

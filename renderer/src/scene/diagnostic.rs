@@ -90,6 +90,16 @@ impl SourceMap {
         self.files.iter().map(|(path, _)| path.as_path())
     }
 
+    /// A hash of all texts: scenes with different texts differ in it. FNV-1a, the same on every machine.
+    pub fn hash(&self) -> u64 {
+        const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+        const PRIME: u64 = 0x0100_0000_01b3;
+        let step = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(PRIME);
+        // The length separates texts, so that moving a line from one file to the next is a difference.
+        let file = |hash, text: &[u8]| (text.len() as u64).to_le_bytes().iter().chain(text).fold(hash, step);
+        self.files.iter().fold(OFFSET, |hash, (_, text)| file(hash, text))
+    }
+
     /// Resolves a span to line and column. For many spans use [`Self::places`].
     pub fn place(&self, span: Span) -> Place {
         self.places().place(span)
