@@ -17,7 +17,7 @@ use renderer::integrator::{AlphaTested, Opaque, Queries, Recorded, Recording};
 use renderer::render::{self, Job, Prepared, Unobserved};
 use renderer::sampling::Sampler;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [scene, resolution, spp, threads @ ..] = arguments.as_slice() else {
         return Err("usage: bench SCENE.pbrt WIDTHxHEIGHT SPP [THREADS]".into());
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ..Job::default()
     };
     let pool = render::thread_pool(job.threads)?;
-    pool.install(|| -> Result<(), Box<dyn std::error::Error>> {
+    pool.install(|| -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let prepared = render::prepare(&job, &Unobserved)?;
         let embree_seconds = match prepared.world.geometry.alpha_test(&prepared.world.textures) {
             None => replay(&prepared, &Opaque(prepared.world.geometry.scene()), spp),
