@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 /// Bounds of one light or of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,24 +90,30 @@ pub fn cone_from_cosine(axis: Vec3, cos: f32) -> (DVec3, f64) {
 
 fn cone_union(a: (DVec3, f64), b: (DVec3, f64)) -> (DVec3, f64) {
     let (a, b) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    if a.1 >= PI {
+        return a;
+    }
+    let cos_between = a.0.dot(b.0);
+    let aside = b.0 - a.0 * cos_between;
+    let sin_between = aside.length();
     // acos would lose small angles.
-    let between = a.0.cross(b.0).length().atan2(a.0.dot(b.0));
+    let between = sin_between.atan2(cos_between);
     if between + b.1 <= a.1 {
         return a;
     }
     let theta_o = 0.5 * (a.1 + between + b.1);
-    let Some(pivot) = a.0.cross(b.0).try_normalize() else { return ALL_DIRECTIONS };
-    if theta_o >= PI {
+    // Opposite axes span no plane to turn in.
+    if theta_o >= PI || sin_between == 0.0 {
         return ALL_DIRECTIONS;
     }
-    // `a` and `b` may be parallel up to rounding, and the pivot imprecise: the axis is made unit again, and the cone is so
-    // narrow there that it does not matter where it points to within that rounding.
-    ((DQuat::from_axis_angle(pivot, theta_o - a.1) * a.0).normalize(), theta_o)
+    let (sin, cos) = (theta_o - a.1).sin_cos();
+    ((a.0 * cos + aside * (sin / sin_between)).normalize(), theta_o)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DQuat;
     use proptest::prelude::*;
 
     fn direction(v: [f64; 3]) -> DVec3 {

@@ -9,8 +9,9 @@ use glam::{DMat3, DVec3, Mat3, Vec3};
 use super::Lights;
 use super::area::{AreaEmitter, Emission as AreaEmission};
 use super::bounds::{ALL_DIRECTIONS, LightBounds, cone_from_cosine};
+use super::environment::{Environment, pbrt_illuminance};
 use super::image::LightImage;
-use super::infinite::{ImageLight, Infinite, pbrt_illuminance};
+use super::infinite::Infinite;
 use super::point::{Emission, Goniometric, PointLight, Projection, Spot};
 use super::tree::{LightTree, build::Candidate};
 use crate::math::{Rgb, luminance};
@@ -299,7 +300,7 @@ impl<Load: Fn(&Path) -> Result<RgbImage, String>> Compiler<Load> {
                 self.warnings.push((span, what.to_owned()));
             }
         }
-        let light = ImageLight::new(LightImage::clone(&image), scale, light_from_world);
+        let light = Environment::new(&image, scale, light_from_world);
         let black = light.is_black();
         self.infinite(Infinite::Image(Box::new(light)), black)
     }

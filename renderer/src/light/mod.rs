@@ -11,7 +11,9 @@
 
 mod area;
 mod bounds;
+mod choose;
 mod compile;
+mod environment;
 mod image;
 mod infinite;
 mod mis;

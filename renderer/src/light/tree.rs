@@ -8,8 +8,9 @@
 
 use glam::Vec3;
 
+use super::Receiver;
 use super::bounds::LightBounds;
-use super::{BELOW_ONE, Receiver};
+use super::choose::choose;
 
 pub(super) mod build;
 
@@ -73,10 +74,9 @@ impl LightTree {
         let (mut u, mut pmf) = (u, 1.0);
         loop {
             let importance = node.importance(from, self.per_scene);
-            let sum: f32 = importance.iter().sum();
-            let (lane, rest) = choose_lane(&importance, u * sum)?;
+            let (lane, rest) = choose(&importance, u)?;
             u = rest;
-            pmf *= importance[lane] / sum;
+            pmf *= importance[lane] / importance.iter().sum::<f32>();
             let link = node.link[lane];
             if link & LEAF != 0 {
                 return (pmf > 0.0).then_some((link & !LEAF, pmf));
@@ -108,25 +108,6 @@ impl LightTree {
         }
         pmf
     }
-}
-
-/// The lane in which `target` in [0, Σ importance) falls, and how far into it in [0, 1). `None`: all are 0.
-#[inline]
-fn choose_lane(importance: &[f32; WIDTH], target: f32) -> Option<(usize, f32)> {
-    let mut before = 0.0;
-    let mut chosen = None;
-    for (lane, &value) in importance.iter().enumerate() {
-        if value > 0.0 {
-            // Rounding may leave the target beyond the last lane: the last one that is not empty takes it.
-            chosen = Some((lane, before));
-            if target < before + value {
-                break;
-            }
-        }
-        before += value;
-    }
-    let (lane, before) = chosen?;
-    Some((lane, ((target - before) / importance[lane]).clamp(0.0, BELOW_ONE)))
 }
 
 impl Node {

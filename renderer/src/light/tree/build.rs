@@ -122,6 +122,9 @@ fn split(candidates: &[Candidate], order: &mut [usize], level: u32, arena: &mut 
 
 /// Reorders the two or more candidates so that a cut after the returned number of them, neither 0 nor all, is good.
 fn partition(candidates: &[Candidate], order: &mut [usize], level: u32) -> usize {
+    if order.len() == 2 {
+        return 1;
+    }
     let centers = order.iter().map(|&i| candidates[i].bounds.center());
     let low = centers.clone().fold(DVec3::INFINITY, DVec3::min);
     let high = centers.fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -176,17 +179,17 @@ fn cheapest_cut(candidates: &[Candidate], order: &[usize], low: DVec3, extent: D
         }
         // Slabs across a long axis are thin and wide: they cost more than their area says.
         let slimness = extent.max_element() / extent[axis];
-        let mut above = [0.0; BINS];
-        let mut group = None;
+        // What lies above each bin.
+        let mut above: [Option<LightBounds>; BINS] = [None; BINS];
         for i in (1..BINS).rev() {
-            group = join(group.as_ref(), bins[i].as_ref());
-            above[i - 1] = group.map_or(f64::INFINITY, |g: LightBounds| g.cost());
+            above[i - 1] = join(above[i].as_ref(), bins[i].as_ref());
         }
-        group = None;
+        let mut below = None;
         for i in 0..BINS - 1 {
-            group = join(group.as_ref(), bins[i].as_ref());
-            let Some(below) = group else { continue };
-            let cost = slimness * (below.cost() + above[i]);
+            // Past an empty bin the groups are the same.
+            let (Some(_), Some(above)) = (bins[i], above[i]) else { continue };
+            below = join(below.as_ref(), bins[i].as_ref());
+            let cost = slimness * (below.map_or(0.0, |b| b.cost()) + above.cost());
             if cost.is_finite() && cheapest.as_ref().is_none_or(|(least, _)| cost < *least) {
                 cheapest = Some((cost, Cut { axis, bin: i }));
             }

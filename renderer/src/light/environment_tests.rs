@@ -2,6 +2,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use super::super::infinite::Infinite;
 use super::super::testing::{Mean, Random};
 use super::*;
 use crate::sampling::stats::chi2_p_value;
@@ -30,7 +31,7 @@ fn transforms() -> [DMat3; 3] {
 }
 
 fn image_light(image: LightImage, light_from_world: DMat3) -> Infinite {
-    Infinite::Image(Box::new(ImageLight::new(image, Rgb::new(1.0, 2.0, 0.5), light_from_world)))
+    Infinite::Image(Box::new(Environment::new(&image, Rgb::new(1.0, 2.0, 0.5), light_from_world)))
 }
 
 /// ∫ of radiance × max(0, cos) to `n` over all directions, by midpoints.
