@@ -86,6 +86,11 @@ impl Spot {
         [self.start, self.end]
     }
 
+    /// Intensity on the axis.
+    pub fn peak(&self) -> Rgb {
+        self.intensity
+    }
+
     /// The integral over all directions of the intensity over that on the axis, sr. A smooth step has the mean ½.
     pub fn solid_angle(cone: f32, delta: f32) -> f64 {
         let spot = Self::new(Rgb::ONE, cone, delta);

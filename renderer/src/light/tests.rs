@@ -451,6 +451,27 @@ fn narrow_spots_are_found_in_their_whole_cone() {
 }
 
 #[test]
+fn emitters_are_chosen_on_their_side_and_only_there() {
+    let mut random = Random::new(52);
+    for round in 0..50 {
+        let corners: Vec<_> = (0..7).map(|_| [random.cube(), random.cube(), random.cube()]).collect();
+        let emitters = corners.iter().map(|&p| emitter(triangle(p), 0)).collect();
+        let lights = build(&[], &[area_light(Rgb::ONE)], emitters);
+        for _ in 0..50 {
+            let from = Receiver { p: random.cube() * 1.5, n: Vec3::ZERO };
+            for (number, [a, b, c]) in corners.iter().enumerate() {
+                let height = (from.p - *a).dot((*b - *a).cross(*c - *a).normalize());
+                // Distances are of the order of 1 and known to some ulps.
+                if height.abs() > 1e-5 {
+                    let pmf = lights.tree.pmf(&from, number as u32);
+                    assert_eq!(pmf > 0.0, height > 0.0, "{round} {number}: {pmf} at {height}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn hopeless_input_is_safe() {
     let nowhere = Receiver { p: Vec3::ONE, n: Vec3::Z };
     let empty = build(&[], &[], vec![]);

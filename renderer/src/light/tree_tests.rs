@@ -170,9 +170,9 @@ fn extreme_intensities_and_places_stay_finite() {
         let lights: Vec<_> =
             (0..100).map(|i| point(i, random.cube() * scale, 10.0_f64.powi(i as i32 % 25 - 12))).collect();
         let tree = LightTree::build(&lights, 100, 3.0 * f64::from(scale));
-        for i in 0..100 {
+        for light in &lights {
             // At the place of a light, and anywhere.
-            for p in [lights[i].bounds.low.as_vec3(), random.cube() * scale, random.cube() * scale * 1e4] {
+            for p in [light.bounds.low.as_vec3(), random.cube() * scale, random.cube() * scale * 1e4] {
                 let from = Receiver { p, n: Vec3::ZERO };
                 let mut sum = 0.0;
                 for light in 0..100 {
