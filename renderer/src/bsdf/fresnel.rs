@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::math::Rgb;
+use crate::spectrum::ConductorTable;
 
 /// What a smooth dielectric interface does to a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,39 +63,11 @@ pub fn conductor(cos_i: f32, eta: Rgb, k: Rgb) -> Rgb {
     (0.5 * (parallel + perpendicular)).clamp(Rgb::ZERO, Rgb::ONE)
 }
 
-/// Reflectance of a conductor over the angle of incidence, tabulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReflectanceCurve {
-    /// At cosθ = i/`INTERVALS`, and the last value once more, so that interpolation needs no branch at cosθ = 1.
-    values: [Rgb; Self::INTERVALS + 2],
-}
-
-impl ReflectanceCurve {
-    /// Steepest at grazing incidence, where the curvature of real metals stays below 50: linear interpolation is then
-    /// wrong by at most 50/(8 · 64²) < 0.002.
-    const INTERVALS: usize = 64;
-
-    /// Tabulates `reflectance`, a function of cosθ.
-    pub fn new(reflectance: impl Fn(f32) -> Rgb) -> Self {
-        let at = |i: usize| reflectance(i.min(Self::INTERVALS) as f32 / Self::INTERVALS as f32);
-        Self { values: std::array::from_fn(|i| at(i).clamp(Rgb::ZERO, Rgb::ONE)) }
-    }
-
-    /// Reflectance at cosθ in [0, 1].
-    #[inline]
-    pub fn at(&self, cos_theta: f32) -> Rgb {
-        let x = cos_theta.clamp(0.0, 1.0) * Self::INTERVALS as f32;
-        let i = x as usize;
-        let (a, b) = (self.values[i], self.values[i + 1]);
-        a + (b - a) * (x - i as f32)
-    }
-}
-
 /// Where a conductor takes its reflectance from.
 #[derive(Clone, Copy, Debug)]
 pub enum ConductorFresnel<'w> {
     /// The same metal everywhere: integrated over the spectrum at build.
-    Curve(&'w ReflectanceCurve),
+    Table(&'w ConductorTable),
     /// Complex index per channel, relative to the medium above.
     Index {
         /// Real part.
@@ -109,7 +82,7 @@ impl ConductorFresnel<'_> {
     #[inline]
     pub fn at(&self, cos_theta: f32) -> Rgb {
         match self {
-            Self::Curve(curve) => curve.at(cos_theta),
+            Self::Table(table) => table.reflectance(cos_theta),
             Self::Index { eta, k } => conductor(cos_theta, *eta, *k),
         }
     }
@@ -146,17 +119,6 @@ mod tests {
         for cos in [0.1, 0.5, 0.9] {
             let expected = dielectric(cos, 1.5).reflectance;
             assert!((conductor(cos, Rgb::splat(1.5), Rgb::ZERO).x - expected).abs() < 1e-5);
-        }
-    }
-
-    #[test]
-    fn the_curve_follows_its_function() {
-        // Aluminium at 550 nm: the pseudo-Brewster dip near grazing is the hard part.
-        let (eta, k) = (Rgb::splat(0.958), Rgb::splat(6.69));
-        let curve = ReflectanceCurve::new(|cos| conductor(cos, eta, k));
-        for i in 0..=1000 {
-            let cos = i as f32 / 1000.0;
-            assert!((curve.at(cos) - conductor(cos, eta, k)).abs().max_element() < 0.002, "{cos}");
         }
     }
 

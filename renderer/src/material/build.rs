@@ -1,6 +1,5 @@
 //! Description → materials.
 
-use crate::bsdf::fresnel::ReflectanceCurve;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{CoatTable, MetalTable};
 use crate::math::Rgb;
@@ -128,8 +127,7 @@ impl Builder<'_> {
     fn metal(&mut self, conductor: &description::Conductor, relative: f32) -> Metal {
         match conductor {
             description::Conductor::EtaK { eta: Value::Constant(eta), k: Value::Constant(k) } => {
-                let table = ConductorTable::new(eta, k, relative);
-                self.built.curves.push(ReflectanceCurve::new(|cos_theta| table.reflectance(cos_theta)));
+                self.built.curves.push(ConductorTable::new(eta, k, relative));
                 Metal::Curve(self.built.curves.len() as u32 - 1)
             }
             description::Conductor::EtaK { eta, k } => {

@@ -9,7 +9,7 @@ mod perturb;
 
 use glam::{Vec2, Vec3};
 
-use crate::bsdf::fresnel::{ConductorFresnel, ReflectanceCurve};
+use crate::bsdf::fresnel::ConductorFresnel;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{
     Bsdf, Coat, CoatTable, CoatedConductor, CoatedDiffuse, Conductor, Dielectric, Diffuse, DiffuseTransmission,
@@ -18,13 +18,14 @@ use crate::bsdf::{
 use crate::math::{Frame, Rgb};
 use crate::sampling::mix64;
 use crate::scene::description::{MaterialId, TextureId, Value};
+use crate::spectrum::ConductorTable;
 use crate::texture::{RgbImage, TexturePoint, Textures};
 
 /// All materials of a scene.
 #[derive(Clone, Debug)]
 pub struct Materials {
     list: Vec<Material>,
-    curves: Vec<ReflectanceCurve>,
+    curves: Vec<ConductorTable>,
     coats: Vec<CoatTable>,
     metals: Vec<MetalTable>,
     normal_maps: Vec<RgbImage>,
@@ -180,7 +181,7 @@ impl Materials {
     #[inline]
     fn fresnel(&self, metal: &Metal, at: &TexturePoint, textures: &Textures) -> ConductorFresnel<'_> {
         match metal {
-            Metal::Curve(index) => ConductorFresnel::Curve(&self.curves[*index as usize]),
+            Metal::Curve(index) => ConductorFresnel::Table(&self.curves[*index as usize]),
             Metal::Index { eta, k, relative } => {
                 ConductorFresnel::Index { eta: textures.rgb(eta, at) / *relative, k: textures.rgb(k, at) / *relative }
             }

@@ -90,7 +90,7 @@ fn smooth_lobes_conserve_energy_exactly() {
         let cases = [
             ("glass", glass(1.5, Vec2::ZERO)),
             ("pane", Bsdf::ThinDielectric(ThinDielectric { eta: 1.5 })),
-            ("mirror", metal(Vec2::ZERO, ConductorFresnel::Curve(&PERFECT))),
+            ("mirror", metal(Vec2::ZERO, ConductorFresnel::Table(&PERFECT))),
         ];
         for (name, bsdf) in cases {
             assert!(bsdf.is_specular());
@@ -111,7 +111,7 @@ fn smooth_lobes_conserve_energy_exactly() {
 fn a_perfect_metal_loses_only_what_single_scattering_loses() {
     // Energy after one bounce on GGX is E[G₂/G₁] over visible normals: it falls with roughness, from 1.
     let albedo = |alpha: f32, z: f32| {
-        let bsdf = metal(Vec2::splat(alpha), ConductorFresnel::Curve(&PERFECT));
+        let bsdf = metal(Vec2::splat(alpha), ConductorFresnel::Table(&PERFECT));
         integrate(128, |wi| bsdf.eval(direction(z, 0.0), wi)).x
     };
     assert!((albedo(0.1, 0.9) - 1.0).abs() < 0.02);

@@ -75,7 +75,7 @@ fn a_coated_metal_has_the_walk_s_albedo() {
         for base in [0.0, 0.05, 0.223_606_8, 0.5] {
             for z in COSINES {
                 let wo = direction(z, 0.7);
-                for (name, fresnel) in [("Al", METAL), ("white", ConductorFresnel::Curve(&PERFECT))] {
+                for (name, fresnel) in [("Al", METAL), ("white", ConductorFresnel::Table(&PERFECT))] {
                     let bare = metal(Vec2::splat(base), fresnel);
                     let (parts, error) = reference(&glass(1.5, Vec2::splat(alpha)), &bare, wo, 4_000);
                     let expected: f32 = parts.iter().map(|part| part.z).sum();

@@ -9,9 +9,10 @@ use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
 
-use super::fresnel::{ConductorFresnel, ReflectanceCurve, conductor};
+use super::fresnel::ConductorFresnel;
 use super::microfacet::Ggx;
 use super::*;
+use crate::spectrum::{ConductorTable, Spectrum};
 
 /// A small counter-based generator: the tests' numbers must not change when the renderer's sampler does.
 ///
@@ -47,7 +48,8 @@ pub(super) const METAL: ConductorFresnel<'static> =
     ConductorFresnel::Index { eta: Rgb::new(1.2, 0.96, 0.7), k: Rgb::new(7.3, 6.7, 5.5) };
 
 /// A metal that reflects everything.
-pub(super) static PERFECT: LazyLock<ReflectanceCurve> = LazyLock::new(|| ReflectanceCurve::new(|_| Rgb::ONE));
+pub(super) static PERFECT: LazyLock<ConductorTable> =
+    LazyLock::new(|| ConductorTable::new(&Spectrum::constant(1.0), &Spectrum::Rgb(Rgb::splat(1e9)), 1.0));
 
 /// The coats of the tests, made once: index 1.5, pbrt-v4's default thickness.
 pub(super) struct Coats(Vec<CoatOf>);
@@ -147,11 +149,11 @@ fn a_value_is_small() {
 }
 
 #[test]
-fn curves_and_indices_agree() {
+fn tables_and_indices_agree() {
     let ConductorFresnel::Index { eta, k } = METAL else { unreachable!() };
-    let curve = ReflectanceCurve::new(|cos| conductor(cos, eta, k));
+    let table = ConductorTable::new(&Spectrum::Rgb(eta), &Spectrum::Rgb(k), 1.0);
     let (wo, wi) = (direction(0.4, 0.3), direction(0.6, 3.0));
-    let a = Bsdf::Conductor(Conductor { ggx: Ggx::isotropic(0.3), fresnel: ConductorFresnel::Curve(&curve) });
+    let a = Bsdf::Conductor(Conductor { ggx: Ggx::isotropic(0.3), fresnel: ConductorFresnel::Table(&table) });
     let b = metal(Vec2::splat(0.3), METAL);
     assert!((a.eval(wo, wi) / b.eval(wo, wi) - 1.0).abs().max_element() < 0.003);
 }
