@@ -22,10 +22,8 @@ pub struct CoatTable {
 
 #[derive(Clone, Debug)]
 struct CoatRow {
-    /// R(μ).
-    reflected: CosineTable,
-    /// T(μ), attenuation on the way to the base included.
-    transmitted: CosineTable,
+    /// (R(μ), T(μ)), attenuation on the way to the base included in T.
+    outside: CosineTable<Vec2>,
     /// Mean of T under Lambertian illumination.
     mean_transmitted: f32,
     /// Of Lambertian light from the base, what returns to it, attenuation both ways included.
@@ -73,25 +71,29 @@ impl CoatRow {
 
     fn new(eta: f32, thickness: f32, ggx: Ggx) -> Self {
         let points = facet_points(&ggx, FACETS);
-        let mean = |cos_theta: f32, eta: f32, f: &dyn Fn(&Split) -> f32| {
+        let mean = |cos_theta: f32, eta: f32, f: &dyn Fn(&Split) -> Vec2| {
             let w = grazing_limit(cos_theta);
-            points.iter().map(|&(u, share)| share * f(&Split::new(&ggx, w, eta, u))).sum::<f32>()
+            points.iter().map(|&(u, share)| share * f(&Split::new(&ggx, w, eta, u))).sum::<Vec2>()
         };
         let crossing = |w: Vec3| attenuation(thickness, w.z);
-        let reflected = CosineTable::new(|mu| mean(mu, eta, &|s| s.reflected.map_or(0.0, |r| r.1)));
-        let transmitted = CosineTable::new(|mu| mean(mu, eta, &|s| s.transmitted.map_or(0.0, |t| t.1 * crossing(t.0))));
+        let outside = CosineTable::new(|mu| {
+            mean(mu, eta, &|split| {
+                let transmitted = split.transmitted.map_or(0.0, |(w, energy)| energy * crossing(w));
+                Vec2::new(split.reflected.map_or(0.0, |(_, energy)| energy), transmitted)
+            })
+        });
         let internal = (0..Self::COSINES)
             .map(|i| {
                 // Uniform in μ²: cosine-weighted.
                 let mu = ((i as f32 + 0.5) / Self::COSINES as f32).sqrt();
-                let back = mean(mu, 1.0 / eta, &|s| s.reflected.map_or(0.0, |r| r.1 * crossing(r.0)));
+                let back = |split: &Split| split.reflected.map_or(0.0, |(w, energy)| energy * crossing(w));
+                let back = mean(mu, 1.0 / eta, &|split| Vec2::splat(back(split))).x;
                 f64::from(back * attenuation(thickness, mu))
             })
             .sum::<f64>();
         Self {
-            mean_transmitted: transmitted.cosine_mean(),
-            reflected,
-            transmitted,
+            mean_transmitted: outside.map(|entry| entry.y).cosine_mean(),
+            outside,
             internal: (internal / f64::from(Self::COSINES)) as f32,
         }
     }
@@ -181,16 +183,16 @@ impl<'w> Coat<'w> {
         Self::new(self.ggx.regularized(), self.table)
     }
 
-    /// R(μ).
+    /// R(μ) and T(μ).
     #[inline]
-    pub(super) fn reflected(&self, cos_theta: f32) -> f32 {
-        blend(&self.table.rows, self.row, |row| row.reflected.at(cos_theta))
+    pub(super) fn reflected_and_transmitted(&self, cos_theta: f32) -> (f32, f32) {
+        blend(&self.table.rows, self.row, |row| row.outside.at(cos_theta)).into()
     }
 
     /// T(μ).
     #[inline]
     pub(super) fn transmitted(&self, cos_theta: f32) -> f32 {
-        blend(&self.table.rows, self.row, |row| row.transmitted.at(cos_theta))
+        self.reflected_and_transmitted(cos_theta).1
     }
 
     /// Mean of T under Lambertian illumination.

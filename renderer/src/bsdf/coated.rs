@@ -49,6 +49,8 @@ pub struct CoatedDiffuse<'w> {
     albedo: Rgb,
     /// ρ/η² Σ(ρr)ᵏ.
     base: Rgb,
+    /// Largest channel of the base's albedo seen through the coat, but for T(ωₒ).
+    base_energy: f32,
 }
 
 impl<'w> CoatedDiffuse<'w> {
@@ -58,7 +60,8 @@ impl<'w> CoatedDiffuse<'w> {
         let x = albedo * coat.internal();
         let series = (1..BASE_BOUNCES).fold(Rgb::ONE, |sum, _| Rgb::ONE + x * sum);
         let eta = coat.table.eta();
-        Self { coat, albedo, base: albedo * series / (eta * eta) }
+        let base = albedo * series / (eta * eta);
+        Self { base_energy: base.max_element() * coat.mean_transmitted(), coat, albedo, base }
     }
 
     pub(super) fn regularized(self) -> Self {
@@ -67,9 +70,8 @@ impl<'w> CoatedDiffuse<'w> {
 
     /// Probability of choosing the coat's reflection: by energy.
     #[inline]
-    fn coat_probability(&self, cos_o: f32, transmitted: f32) -> f32 {
-        let coat = self.coat.reflected(cos_o);
-        let base = transmitted * self.coat.mean_transmitted() * self.base.max_element();
+    fn coat_probability(&self, coat: f32, transmitted: f32) -> f32 {
+        let base = transmitted * self.base_energy;
         if coat + base > 0.0 { coat / (coat + base) } else { 0.0 }
     }
 
@@ -78,8 +80,8 @@ impl<'w> CoatedDiffuse<'w> {
         if !wo.same_hemisphere(wi) {
             return (Rgb::ZERO, 0.0);
         }
-        let transmitted = self.coat.transmitted(wo.abs_cos_theta());
-        self.mixture(wo, wi, transmitted, self.coat_probability(wo.abs_cos_theta(), transmitted))
+        let (coat, transmitted) = self.coat.reflected_and_transmitted(wo.abs_cos_theta());
+        self.mixture(wo, wi, transmitted, self.coat_probability(coat, transmitted))
     }
 
     #[inline]
@@ -96,8 +98,8 @@ impl<'w> CoatedDiffuse<'w> {
         if wo.cos_theta() == 0.0 {
             return None;
         }
-        let transmitted = self.coat.transmitted(wo.abs_cos_theta());
-        let probability = self.coat_probability(wo.abs_cos_theta(), transmitted);
+        let (coat, transmitted) = self.coat.reflected_and_transmitted(wo.abs_cos_theta());
+        let probability = self.coat_probability(coat, transmitted);
         let wi = if u_lobe < probability {
             if self.coat.ggx.is_smooth() {
                 return Some(CoatLobe::mirror(&self.coat, wo, probability));
@@ -111,8 +113,8 @@ impl<'w> CoatedDiffuse<'w> {
     }
 
     pub(super) fn albedo(&self, wo: LocalDir) -> Rgb {
-        let mu = wo.abs_cos_theta();
-        self.base * (self.coat.transmitted(mu) * self.coat.mean_transmitted()) + self.coat.reflected(mu)
+        let (coat, transmitted) = self.coat.reflected_and_transmitted(wo.abs_cos_theta());
+        self.base * (transmitted * self.coat.mean_transmitted()) + coat
     }
 }
 
@@ -199,9 +201,8 @@ impl<'w> CoatedConductor<'w> {
 
     #[inline]
     fn choice(&self, cos_o: f32) -> Choice {
-        let transmitted = self.coat.transmitted(cos_o);
+        let (coat, transmitted) = self.coat.reflected_and_transmitted(cos_o);
         let diffused_energy = self.table.diffused(self.position, cos_o);
-        let coat = self.coat.reflected(cos_o);
         let single = self.reflectance * self.echoed.max_element() * self.table.single(self.position, cos_o);
         let diffused = diffused_energy * self.diffused.max_element() * self.table.diffused_mean(self.position);
         let sum = coat + single + diffused;
@@ -283,6 +284,6 @@ impl<'w> CoatedConductor<'w> {
         let single = self.echoed * self.table.single(self.position, mu);
         let diffused =
             self.diffused * (self.table.diffused(self.position, mu) * self.table.diffused_mean(self.position));
-        self.fresnel.at(mu) * single + diffused + self.coat.reflected(mu)
+        self.fresnel.at(mu) * single + diffused + self.coat.reflected_and_transmitted(mu).0
     }
 }

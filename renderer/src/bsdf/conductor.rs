@@ -75,8 +75,10 @@ impl Reflection {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return None;
         }
-        let m = (wo + wi).normalize();
-        Some(Self::at(ggx, wo, wi, m))
+        let h = wo + wi;
+        let h2 = h.length_squared();
+        // cosθ = wo·h/|h|, and wo·h = 1 + wo·wi = |h|²/2.
+        Some(Self::at(ggx, wo, wi, ggx.d_along(h, h2), 0.5 * h2.sqrt()))
     }
 
     /// By visible normals; `None` where the facet reflects into the surface.
@@ -87,18 +89,13 @@ impl Reflection {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        Some(Self::at(ggx, wo, wi, m))
+        Some(Self::at(ggx, wo, wi, ggx.d(m), wo.dot(m).max(0.0)))
     }
 
     #[inline]
-    fn at(ggx: &Ggx, wo: Vec3, wi: Vec3, m: Vec3) -> Self {
-        let half_d = 0.5 * ggx.d(m);
+    fn at(ggx: &Ggx, wo: Vec3, wi: Vec3, d: f32, cos_d: f32) -> Self {
+        let half_d = 0.5 * d;
         let (so, si) = (ggx.stretch(wo), ggx.stretch(wi));
-        Self {
-            wi,
-            cos_d: wo.dot(m).max(0.0),
-            value: half_d * wi.z / (wi.z * so + wo.z * si),
-            pdf: half_d / (wo.z + so),
-        }
+        Self { wi, cos_d, value: half_d * wi.z / (wi.z * so + wo.z * si), pdf: half_d / (wo.z + so) }
     }
 }

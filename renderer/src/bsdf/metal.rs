@@ -12,7 +12,7 @@ use super::coat::{Coat, CoatTable, FACETS, Split, attenuation, facet_points, gra
 use super::conductor::Reflection;
 use super::fresnel::dielectric;
 use super::microfacet::Ggx;
-use super::table::{Axis, CosineTable, Position, blend};
+use super::table::{Axis, CosineTable, INTERVALS, Position, blend};
 use crate::math::Rgb;
 
 /// Bounces on the base that pbrt-v4 follows: every other of its default `maxdepth` 10 events.
@@ -58,12 +58,18 @@ impl MetalTable {
     pub fn new(coat: &CoatTable, base_alpha: Option<f32>) -> Self {
         let coats = if coat.is_textured() { Axis::textured(&Self::NODES) } else { coat.alphas().clone() };
         let base = base_alpha.map_or_else(|| Axis::textured(&Self::NODES), Axis::constant);
-        let rows = coats
-            .nodes()
-            .iter()
-            .flat_map(|&c| base.nodes().iter().map(move |&b| (c, b)))
-            .map(|(c, b)| MetalRow::new(&Coat::new(Ggx::isotropic(c), coat), Ggx::isotropic(b)))
-            .collect();
+        // Of two constant widths both are regularised or neither is: the mixed rows are hardly asked for.
+        let paired = base_alpha.is_some() && !coat.is_textured() && coats.nodes().len() == 2 && base.nodes().len() == 2;
+        let mut rows: Vec<MetalRow> = Vec::with_capacity(coats.nodes().len() * base.nodes().len());
+        for (i, &c) in coats.nodes().iter().enumerate() {
+            for (j, &b) in base.nodes().iter().enumerate() {
+                let row = match rows.last() {
+                    Some(row) if paired && i != j => row.clone(),
+                    _ => MetalRow::new(&Coat::new(Ggx::isotropic(c), coat), Ggx::isotropic(b)),
+                };
+                rows.push(row);
+            }
+        }
         Self { coat: coats, base, rows }
     }
 
@@ -281,12 +287,12 @@ impl Entries {
             };
             points.iter().filter_map(enter).collect()
         };
-        Self((0..=CosineTable::INTERVALS).map(|i| at(i as f32 / CosineTable::INTERVALS as f32)).collect())
+        Self((0..=INTERVALS).map(|i| at(i as f32 / INTERVALS as f32)).collect())
     }
 
     /// Mean of `f` over what enters at `mu`, a node of a [`CosineTable`].
     fn mean(&self, mu: f32, f: impl Fn(f32) -> f32) -> f32 {
-        let node = (mu * CosineTable::INTERVALS as f32).round() as usize;
+        let node = (mu * INTERVALS as f32).round() as usize;
         self.0[node].iter().map(|&(cosine, energy)| energy * f(cosine)).sum()
     }
 }
@@ -301,14 +307,14 @@ impl LobeSamples {
     fn new(coat: &Coat, base: &Ggx) -> Self {
         let eta = coat.table.eta();
         let at = |i: usize| -> Vec<(f32, f32)> {
-            let wo = grazing_limit(i as f32 / CosineTable::INTERVALS as f32);
+            let wo = grazing_limit(i as f32 / INTERVALS as f32);
             let Some(w) = inside(wo, eta) else { return Vec::new() };
             // Light on its way out is attenuated as part of what the coat transmits.
             let up = up_from_base(base, w, 0.0);
             let out = up.iter().filter_map(|&(mu, energy)| Some((inside(grazing_limit(mu), 1.0 / eta)?.z, energy)));
             out.map(|(mu, energy)| (mu, energy * coat.transmitted(wo.z) * coat.transmitted(mu))).collect()
         };
-        Self { samples: (0..=CosineTable::INTERVALS).map(at).collect() }
+        Self { samples: (0..=INTERVALS).map(at).collect() }
     }
 
     /// Directional albedo of the closed form times `gain` of the direction in which the light leaves.

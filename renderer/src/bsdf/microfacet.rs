@@ -58,8 +58,19 @@ impl Ggx {
     /// Density of microfacet area over normals, sr⁻¹. `m` need not face up.
     #[inline]
     pub fn d(&self, m: Vec3) -> f32 {
-        let e = (m.truncate() / self.alpha).length_squared() + m.z * m.z;
-        FRAC_1_PI / (self.alpha.x * self.alpha.y * e * e)
+        self.d_along(m, 1.0)
+    }
+
+    /// [`Self::d`] of the normal along `h`, of squared length `h2`: the normal itself need not be formed.
+    ///
+    /// D = 1/(π αₓαᵧ e²) with e = x²/αₓ² + y²/αᵧ² + z² of the unit normal, cleared of all divisions but one.
+    #[inline]
+    pub fn d_along(&self, h: Vec3, h2: f32) -> f32 {
+        let area = self.alpha.x * self.alpha.y;
+        let (x, y, z) = (h.x * self.alpha.y, h.y * self.alpha.x, h.z * area);
+        // 1/e, at most area⁻² ≤ 10¹⁴. Of an h too short to be squared nothing is known: its density is 0.
+        let inverse = h2 / (x * x + y * y + z * z).max(f32::MIN_POSITIVE);
+        FRAC_1_PI * area * area * area * inverse * inverse
     }
 
     /// s(w) of the module's head.

@@ -1,46 +1,63 @@
 //! Small tables over cosθ and over the roughness of a coat.
 
+/// What a table may hold: numbers, or several together.
+pub(super) trait Entry:
+    Copy + Default + std::ops::Add<Output = Self> + std::ops::Sub<Output = Self> + std::ops::Mul<f32, Output = Self>
+{
+}
+
+impl Entry for f32 {}
+impl Entry for glam::Vec2 {}
+
 /// Function of cosθ in [0, 1], piecewise linear between values at multiples of 1/`INTERVALS`.
 ///
 /// The curvature of what is tabulated here reaches that of Schlick's (1 − cosθ)⁵, 20, so an interpolated value is wrong
 /// by at most 20/(8 · 64²) < 0.001.
 #[derive(Clone, Debug)]
-pub(super) struct CosineTable {
+pub(super) struct CosineTable<T = f32> {
     /// The last value stands twice, so that interpolation needs no branch at cosθ = 1.
-    values: [f32; Self::INTERVALS + 2],
+    values: [T; INTERVALS + 2],
 }
 
-impl CosineTable {
-    pub const INTERVALS: usize = 64;
+/// Intervals of a [`CosineTable`].
+pub(super) const INTERVALS: usize = 64;
 
+impl<T: Entry> CosineTable<T> {
     /// Tabulates `f`.
-    pub fn new(mut f: impl FnMut(f32) -> f32) -> Self {
-        let mut values = [0.0; Self::INTERVALS + 2];
-        for (i, value) in values[..=Self::INTERVALS].iter_mut().enumerate() {
-            *value = f(i as f32 / Self::INTERVALS as f32);
+    pub fn new(mut f: impl FnMut(f32) -> T) -> Self {
+        let mut values = [T::default(); INTERVALS + 2];
+        for (i, value) in values[..=INTERVALS].iter_mut().enumerate() {
+            *value = f(i as f32 / INTERVALS as f32);
         }
-        values[Self::INTERVALS + 1] = values[Self::INTERVALS];
+        values[INTERVALS + 1] = values[INTERVALS];
         Self { values }
     }
 
     /// Value at cosθ, clamped to [0, 1].
     #[inline]
-    pub fn at(&self, cos_theta: f32) -> f32 {
-        let x = cos_theta.clamp(0.0, 1.0) * Self::INTERVALS as f32;
+    pub fn at(&self, cos_theta: f32) -> T {
+        let x = cos_theta.clamp(0.0, 1.0) * INTERVALS as f32;
         let i = x as usize;
         let (a, b) = (self.values[i], self.values[i + 1]);
         a + (b - a) * (x - i as f32)
     }
 
+    /// One of the functions that are tabulated together.
+    pub fn map(&self, f: impl Fn(T) -> f32) -> CosineTable {
+        CosineTable { values: self.values.map(f) }
+    }
+}
+
+impl CosineTable {
     /// ∫ 2μ f(μ) dμ: the mean under Lambertian illumination. By Simpson's rule on the nodes, which is exact for the
     /// linear pieces times μ when their midpoints are interpolated.
     pub fn cosine_mean(&self) -> f32 {
-        let h = 1.0 / Self::INTERVALS as f64;
+        let h = 1.0 / INTERVALS as f64;
         let piece = |i: usize| {
             let (x, a, b) = (i as f64 * h, f64::from(self.values[i]), f64::from(self.values[i + 1]));
             h / 6.0 * 2.0 * (x * a + 4.0 * (x + 0.5 * h) * 0.5 * (a + b) + (x + h) * b)
         };
-        (0..Self::INTERVALS).map(piece).sum::<f64>() as f32
+        (0..INTERVALS).map(piece).sum::<f64>() as f32
     }
 }
 
@@ -84,7 +101,7 @@ impl Axis {
 
 /// `f` of the entry of `rows`, interpolated between two where the position lies between them.
 #[inline]
-pub(super) fn blend<T>(rows: &[T], position: Position, f: impl Fn(&T) -> f32) -> f32 {
+pub(super) fn blend<R, T: Entry>(rows: &[R], position: Position, f: impl Fn(&R) -> T) -> T {
     let index = position.index as usize;
     let a = f(&rows[index]);
     if position.fraction == 0.0 { a } else { a + (f(&rows[index + 1]) - a) * position.fraction }
