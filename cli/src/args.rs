@@ -1,0 +1,407 @@
+//! The command line as it was typed. What it means is [`crate::job`]'s.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use renderer::film::AovSet;
+
+use crate::exit;
+
+/// Renders pbrt-v4 scenes by path tracing.
+#[derive(Debug, Parser)]
+#[command(name = "tessera", version, max_term_width = 100, after_help = exit::HELP, arg_required_else_help = true)]
+#[command(subcommand_required = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Where to report.
+    #[command(flatten)]
+    pub log: LogArguments,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene to an OpenEXR image
+    Render(Box<RenderArguments>),
+    /// Say what a scene contains and what it takes to render it
+    Info(InfoArguments),
+    /// Measure how far an image is from a reference
+    Compare(CompareArguments),
+    /// Turn an image into a PNG for looking at
+    Preview(PreviewArguments),
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Log")]
+pub struct LogArguments {
+    /// Show details, on standard error
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+    /// Show nothing but errors on standard error
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Append all log lines, details included, to a file
+    #[arg(long, global = true, value_name = "FILE")]
+    pub log_file: Option<PathBuf>,
+}
+
+const RENDER_HELP: &str = "\
+Examples:
+  Draft at a quarter of the samples, half the size:
+    tessera render kitchen/scene-v4.pbrt -o draft.exr --spp 64 --resolution 640x360
+
+  Frame 12 of a shot, with the channels that denoisers and compositors want:
+    tessera render shot.0012.pbrt -o out/shot.####.exr --frame 12 --aov albedo,N,depth
+
+  Slice 2 of 4 of a frame, for a farm that merges samples afterwards:
+    tessera render shot.pbrt -o out/shot.s1.exr --spp 1024 --sample-range 256:512 --progress alf
+
+  As good as ten minutes allow:
+    tessera render shot.pbrt -o shot.exr --spp 100000 --time-limit 10m
+
+The same scene, seed and samples give the same file, byte for byte, on any number of threads; only a time limit makes \
+the number of samples depend on the machine. The file appears under its name only when it is complete. Its date is that \
+of the environment variable SOURCE_DATE_EPOCH, else 1970; --provenance writes the real one.
+
+Standard output carries lines for machines only (--progress), standard error lines for people.";
+
+/// Options of `render`.
+#[derive(Clone, Debug, Args)]
+#[command(after_long_help = format!("{RENDER_HELP}\n\n{}", exit::HELP), after_help = "--help says more, with examples.")]
+pub struct RenderArguments {
+    /// The scene, a pbrt-v4 file
+    pub scene: PathBuf,
+    /// The image to write, *.exr. #### or %04d in its name become the frame number
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Frame number for the output's name
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    pub frame: i32,
+
+    /// How good the picture gets.
+    #[command(flatten)]
+    pub quality: QualityArguments,
+    /// Which pixels are rendered.
+    #[command(flatten)]
+    pub frame_area: FrameArguments,
+    /// What is written.
+    #[command(flatten)]
+    pub channels: ChannelArguments,
+    /// How it runs.
+    #[command(flatten)]
+    pub run: RunArguments,
+}
+
+/// How good the picture gets.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Quality")]
+pub struct QualityArguments {
+    /// Samples per pixel [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub spp: Option<u64>,
+    /// Take only samples A to B - 1 of each pixel
+    #[arg(long, value_name = "A:B", value_parser = sample_range)]
+    pub sample_range: Option<Range<u64>>,
+    /// Seed of the random numbers [default: the scene's]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Stop rendering after this long and write what there is: 90, 90s, 10m, 1.5h
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub time_limit: Option<Duration>,
+    /// Exit with 5 if a sample had to be rejected because it was not a number
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Which pixels are rendered.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Frame")]
+pub struct FrameArguments {
+    /// Size of the whole frame in pixels [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    pub resolution: Option<Resolution>,
+    /// Render part of the frame, given by fractions of its size: x from the left, y from the top
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, conflicts_with = "pixel_bounds")]
+    pub crop: Option<[f32; 4]>,
+    /// Render part of the frame, given in pixels: from X0 to X1 - 1, Y0 to Y1 - 1
+    #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = pixel_bounds, allow_hyphen_values = true)]
+    pub pixel_bounds: Option<[i32; 4]>,
+}
+
+/// What is written.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub struct ChannelArguments {
+    /// Auxiliary channels to write besides R G B A, or "all"
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov_names())]
+    pub aov: Vec<String>,
+    /// Write counts, times and memory to a JSON file
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+    /// Record host, date, time and memory in the image: files then differ from run to run
+    #[arg(long)]
+    pub provenance: bool,
+}
+
+/// How it runs.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Run")]
+pub struct RunArguments {
+    /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+    /// How progress is shown
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub progress: ProgressKind,
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ProgressKind {
+    /// A bar on a terminal, else alf
+    #[default]
+    Auto,
+    /// A bar, on standard error
+    Bar,
+    /// Lines "ALF_PROGRESS 42%", as Tractor, Deadline and Afanasy read them
+    Alf,
+    /// Lines "openjd_progress: 42.0", as Open Job Description reads them
+    Openjd,
+    /// One JSON object a line
+    Json,
+    /// Nothing
+    None,
+}
+
+/// Options of `info`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Example:
+  tessera info scene.pbrt --format json | jq .memory.total_bytes
+
+The scene is read and built as for rendering, so whatever would keep it from rendering is reported here, with exit \
+code 3.")]
+pub struct InfoArguments {
+    /// The scene, a pbrt-v4 file
+    pub scene: PathBuf,
+    /// How the answer is printed
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub format: ReportFormat,
+    /// Only read the files: no geometry is built, no mesh and no texture is opened
+    #[arg(long)]
+    pub parse_only: bool,
+    /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+}
+
+/// How an answer is printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ReportFormat {
+    /// For people
+    #[default]
+    Text,
+    /// One JSON object
+    Json,
+}
+
+/// Options of `compare`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Figures, of image I against reference R, over all pixels and the three channels:
+  relMSE        mean of (I - R)² / (R² + 0.01 m²), m being the channel's mean in R
+  RMSE          root of the mean of (I - R)²
+  mean ratio    mean of I over mean of R, a channel each
+  blocks        median over 32 x 32 pixel blocks of the difference between the blocks' means, relative to R's
+  SSIM          structural similarity of tone-mapped luminance, 1 where they look the same
+
+Example:
+  tessera compare out.exr reference.exr -o difference.exr --max-relmse 0.02 || echo too noisy
+
+Exit codes: 0 compared and within all thresholds; 3 an image cannot be read, or the sizes differ; 5 over a threshold, \
+or pixels are not finite.")]
+pub struct CompareArguments {
+    /// The image
+    pub image: PathBuf,
+    /// The reference it is measured against
+    pub reference: PathBuf,
+    /// Write the difference: |I - R| in R G B, I - R in signed.R signed.G signed.B
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Compare the channels of this layer (as albedo or N) instead of R G B
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+    /// How the answer is printed
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub format: ReportFormat,
+    /// Exit with 5 if the relMSE is above this
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub max_relmse: Option<f64>,
+    /// Exit with 5 if a channel's mean ratio is further than this from 1
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub max_mean_difference: Option<f64>,
+    /// Exit with 5 if the median difference of blocks is above this
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub max_block_difference: Option<f64>,
+}
+
+/// Options of `preview`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Example:
+  tessera preview out.exr -o out.png --exposure 1.5")]
+pub struct PreviewArguments {
+    /// The image, of any format, taken to be linear unless it has 8 bits
+    pub image: PathBuf,
+    /// The PNG to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Exposure in stops: each doubles the light
+    #[arg(long, value_name = "EV", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// How light becomes display values
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub tone: Tone,
+    /// Show the channels of this layer (as albedo or N) instead of R G B
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+}
+
+/// How light becomes display values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Tone {
+    /// A film-like curve that keeps highlights
+    #[default]
+    Filmic,
+    /// The sRGB transfer function, cut off at 1
+    Srgb,
+}
+
+/// Width and height in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution(pub [u32; 2]);
+
+impl FromStr for Resolution {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || "expected width x height in pixels, such as 1280x720".to_owned();
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+        let size = [width, height].map(|side| side.trim().parse().ok().filter(|&side| side > 0));
+        let [Some(width), Some(height)] = size else { return Err(wrong()) };
+        if u64::from(width) * u64::from(height) > i32::MAX as u64 {
+            return Err(format!("{width}x{height} has more pixels than an image file holds"));
+        }
+        Ok(Self([width, height]))
+    }
+}
+
+fn aov_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(AovSet::NAMES.into_iter().chain(["all"]))
+}
+
+fn sample_range(text: &str) -> Result<Range<u64>, String> {
+    let wrong = || "expected first:end, such as 0:64 for the first 64 samples".to_owned();
+    let (start, end) = text.split_once(':').ok_or_else(wrong)?;
+    let (start, end) = (start.parse().map_err(|_| wrong())?, end.parse().map_err(|_| wrong())?);
+    if start >= end {
+        return Err(format!("{start}:{end} holds no sample: the end must be above the start"));
+    }
+    Ok(start..end)
+}
+
+fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "expected a time above 0, such as 90, 90s, 10m or 1.5h".to_owned();
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let seconds = match unit {
+        "" | "s" => 1.0,
+        "m" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(wrong()),
+    };
+    let number: f64 = number.parse().map_err(|_| wrong())?;
+    Duration::try_from_secs_f64(number * seconds).ok().filter(|time| !time.is_zero()).ok_or_else(wrong)
+}
+
+fn four<T: FromStr>(text: &str) -> Option<[T; 4]> {
+    let numbers: Vec<T> = text.split(',').map(|number| number.trim().parse().ok()).collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+fn crop(text: &str) -> Result<[f32; 4], String> {
+    let crop: [f32; 4] = four(text).ok_or("expected four numbers, such as 0.25,0.75,0,0.5")?;
+    let [x0, x1, y0, y1] = crop;
+    let within = |a: f32, b: f32| 0.0 <= a && a < b && b <= 1.0;
+    if !(within(x0, x1) && within(y0, y1)) {
+        return Err("expected 0 <= X0 < X1 <= 1 and 0 <= Y0 < Y1 <= 1".into());
+    }
+    Ok(crop)
+}
+
+fn pixel_bounds(text: &str) -> Result<[i32; 4], String> {
+    let bounds: [i32; 4] = four(text).ok_or("expected four whole numbers, such as 0,64,0,32")?;
+    let [x0, x1, y0, y1] = bounds;
+    if x0 >= x1 || y0 >= y1 {
+        return Err("expected X0 < X1 and Y0 < Y1".into());
+    }
+    Ok(bounds)
+}
+
+fn threshold(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| *x >= 0.0).ok_or_else(|| "expected a number of 0 or more".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn times_have_units() {
+        for (text, seconds) in [("90", 90.0), ("90s", 90.0), ("1.5m", 90.0), ("2h", 7200.0), ("0.25", 0.25)] {
+            assert_eq!(duration(text).unwrap().as_secs_f64(), seconds, "{text}");
+        }
+        for bad in ["", "m", "-1s", "0", "10 minutes", "1d", "nan", "inf", "1e400"] {
+            assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn resolutions_ranges_and_windows_are_checked() {
+        assert_eq!("640x360".parse(), Ok(Resolution([640, 360])));
+        for bad in ["640", "0x9", "640x", "x", "-1x2", "1.5x2", "99999x99999", "640x360x2"] {
+            assert!(bad.parse::<Resolution>().is_err(), "{bad}");
+        }
+        assert_eq!(sample_range("16:48"), Ok(16..48));
+        for bad in ["", "5", "5:5", "6:5", ":5", "5:", "-1:5", "0:x"] {
+            assert!(sample_range(bad).is_err(), "{bad}");
+        }
+        assert_eq!(crop("0.25, 0.75,0,1"), Ok([0.25, 0.75, 0.0, 1.0]));
+        for bad in ["0,1,0", "0,1,0,1.1", "0.5,0.5,0,1", "1,0,0,1", "nan,1,0,1", "a,b,c,d"] {
+            assert!(crop(bad).is_err(), "{bad}");
+        }
+        assert_eq!(pixel_bounds("-4,64,0,32"), Ok([-4, 64, 0, 32]));
+        assert!(pixel_bounds("4,4,0,32").is_err() && pixel_bounds("0,4,0,3.5").is_err());
+        assert!(threshold("-1").is_err() && threshold("nan").is_err() && threshold("0.02").is_ok());
+    }
+
+    #[test]
+    fn a_flag_of_every_command_may_stand_anywhere() {
+        for line in [["tessera", "-v", "info", "a.pbrt"], ["tessera", "info", "a.pbrt", "-v"]] {
+            assert!(Arguments::try_parse_from(line).unwrap().log.verbose);
+        }
+    }
+}

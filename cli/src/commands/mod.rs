@@ -1,0 +1,43 @@
+//! The commands, one file each.
+
+mod compare;
+mod info;
+mod preview;
+mod render;
+
+use std::io::{self, Write};
+
+use crate::args::{Arguments, Command};
+use crate::exit::Failure;
+use crate::log::{Level, Log};
+
+/// Does what the command line says.
+///
+/// # Errors
+/// Whatever keeps the command from succeeding; it has been reported.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let shown = match (arguments.log.quiet, arguments.log.verbose) {
+        (true, _) => Level::Error,
+        (false, true) => Level::Verbose,
+        (false, false) => Level::Info,
+    };
+    let mut log = Log::new(shown);
+    let result = log.open_file(arguments.log.log_file.as_deref()).and_then(|()| match &arguments.command {
+        Command::Render(arguments) => render::run(arguments, &log),
+        Command::Info(arguments) => info::run(arguments, &log),
+        Command::Compare(arguments) => compare::run(arguments, &log),
+        Command::Preview(arguments) => preview::run(arguments, &log),
+    });
+    result.inspect_err(|failure| log.error(&failure.to_string()))
+}
+
+/// Prints a command's answer on standard output. A reader that has seen enough is no failure.
+fn print(answer: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(answer.as_bytes()).and_then(|()| out.flush()) {
+        Err(why) if why.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::Output(format!("cannot write to standard output: {why}")))
+        }
+        _ => Ok(()),
+    }
+}

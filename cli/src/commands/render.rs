@@ -1,0 +1,316 @@
+//! `tessera render`: from a scene file to an image file.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use oiio::Attribute;
+use renderer::film::AovSet;
+use renderer::film::exr::{self, Losses};
+use renderer::render::{self, Frame, Job, Observer, Phase, RenderError};
+use renderer::scene::{Diagnostic, Severity};
+
+use crate::args::RenderArguments;
+use crate::exit::Failure;
+use crate::job;
+use crate::log::Log;
+use crate::output::OutputFile;
+use crate::progress::Progress;
+use crate::stats::{self, Memory, Primitives, Problems, Rays, Seconds, Stats};
+
+/// Warnings beyond this many are only counted, unless details are asked for.
+const WARNINGS_SHOWN: u64 = 20;
+
+/// Runs the command.
+pub fn run(arguments: &RenderArguments, log: &Log) -> Result<(), Failure> {
+    let progress = Progress::new(arguments.run.progress, log);
+    render(arguments, log, &progress).inspect_err(|failure| progress.fail(failure))
+}
+
+fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Result<(), Failure> {
+    job::check_samples(arguments)?;
+    let path = job::output(arguments)?;
+    let output = OutputFile::prepare(&path)?;
+    let stats_path = arguments.channels.stats.as_deref().map(|path| job::named(path, arguments.frame));
+    let stats_file = stats_path.as_deref().map(OutputFile::prepare).transpose()?;
+
+    let job = job(arguments);
+    log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
+    let reporter = Reporter { log, progress, warnings: AtomicU64::new(0) };
+    let frame = render::render(&job, &reporter).map_err(|error| reporter.failure(error))?;
+
+    progress.phase("write");
+    let start = Instant::now();
+    library_threads(job.threads, log);
+    let losses = exr::write(&frame.film, attributes(arguments, &frame), output.target())
+        .map_err(|error| Failure::Output(error.to_string()))?;
+    let outcome = Outcome { path: &path, losses, write_seconds: start.elapsed().as_secs_f64() };
+
+    let stats = outcome.stats(arguments, &frame, &reporter);
+    if let Some(file) = stats_file {
+        let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
+        file.write((text + "\n").as_bytes())?;
+    }
+    progress.finish(&path, stats.memory.peak_resident_bytes);
+    tell(&stats, &frame, log);
+    judge(arguments, &stats)
+}
+
+fn job(arguments: &RenderArguments) -> Job {
+    let mut aovs = AovSet::default();
+    for name in &arguments.channels.aov {
+        if name == "all" {
+            aovs = AovSet::all();
+        } else {
+            aovs.insert(name);
+        }
+    }
+    Job {
+        scene: arguments.scene.clone(),
+        spp: arguments.quality.spp,
+        seed: arguments.quality.seed,
+        resolution: arguments.frame_area.resolution.map(|size| size.0),
+        crop: arguments.frame_area.crop,
+        pixel_bounds: arguments.frame_area.pixel_bounds,
+        sample_range: arguments.quality.sample_range.clone(),
+        threads: job::threads(arguments.run.threads, job::slurm().as_deref()),
+        aovs,
+        time_limit: arguments.quality.time_limit,
+        ..Job::default()
+    }
+}
+
+/// OpenImageIO's own threads: the renderer allows it none beside its own; the file at the end may have all.
+fn library_threads(threads: usize, log: &Log) {
+    if let Err(error) = oiio::set_threads(threads) {
+        log.verbose(&format!("{error}; its default stays"));
+    }
+}
+
+/// Passes on what the renderer says.
+struct Reporter<'a> {
+    log: &'a Log,
+    progress: &'a Progress<'a>,
+    warnings: AtomicU64,
+}
+
+impl Observer for Reporter<'_> {
+    fn warning(&self, warning: &Diagnostic) {
+        let text = warning.to_string();
+        self.progress.diagnostic("warning", &text);
+        match self.warnings.fetch_add(1, Ordering::Relaxed) {
+            0..WARNINGS_SHOWN => self.log.warning(&text),
+            WARNINGS_SHOWN => {
+                self.log.warning("more warnings follow; --verbose or --log-file has them");
+                self.log.verbose(&text);
+            }
+            _ => self.log.verbose(&text),
+        }
+    }
+
+    fn phase(&self, phase: Phase) {
+        let name = match phase {
+            Phase::Parse => "parse",
+            Phase::Compile => "build",
+            Phase::Render => "render",
+        };
+        self.log.verbose(&format!("{name} after {:.3} s", self.log.elapsed()));
+        self.progress.phase(name);
+        if phase == Phase::Render {
+            self.progress.advance(0.0);
+        }
+    }
+
+    fn progress(&self, done: f64) {
+        self.progress.advance(done);
+    }
+}
+
+impl Reporter<'_> {
+    /// Shows all that is wrong with a scene, and says what that means for the command.
+    fn failure(&self, error: RenderError) -> Failure {
+        let summary = error.to_string();
+        match error {
+            RenderError::Scene(diagnostics) | RenderError::Compile(diagnostics) => {
+                for diagnostic in &diagnostics {
+                    match diagnostic.severity {
+                        Severity::Warning => self.warning(diagnostic),
+                        Severity::Error => {
+                            let text = diagnostic.to_string();
+                            self.progress.diagnostic("error", &text);
+                            self.log.diagnostic(&text);
+                        }
+                    }
+                }
+                Failure::Input(summary)
+            }
+            RenderError::EmptySampleRange(_) => Failure::Usage(summary),
+            RenderError::Embree(_) | RenderError::OpenImageIo(_) | RenderError::Threads { .. } => {
+                Failure::Render(summary)
+            }
+        }
+    }
+}
+
+/// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
+/// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
+fn attributes(arguments: &RenderArguments, frame: &Frame) -> Vec<(String, Attribute)> {
+    let description = &frame.description;
+    let samples = &description.sample_range;
+    let text = |text: String| Attribute::Text(text);
+    let mut attributes = vec![
+        ("Software".into(), text(job::software())),
+        ("DateTime".into(), text(job::date(std::env::var("SOURCE_DATE_EPOCH").ok().as_deref()))),
+        ("chromaticities".into(), Attribute::Floats(REC709.into())),
+        ("worldtocamera".into(), Attribute::Matrix(description.camera_from_world.as_mat4().to_cols_array())),
+        ("samplesPerPixel".into(), Attribute::Int(i32::try_from(samples.end - samples.start).unwrap_or(i32::MAX))),
+        ("tessera/version".into(), text(env!("CARGO_PKG_VERSION").into())),
+        ("tessera/integrator".into(), text("path".into())),
+        ("tessera/seed".into(), text(description.seed.to_string())),
+        ("tessera/frame".into(), Attribute::Int(arguments.frame)),
+        ("tessera/sampleRange".into(), text(format!("{}:{}", samples.start, samples.end))),
+        ("tessera/complete".into(), Attribute::Int(description.complete().into())),
+        ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
+        ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(frame)))),
+    ];
+    if arguments.channels.provenance {
+        add_provenance(&mut attributes, frame);
+    }
+    attributes
+}
+
+/// Chromaticities of red, green, blue and white: ITU-R BT.709.
+const REC709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
+
+/// What two files must share, besides the scene, for their samples to belong to one picture: not the sample range.
+fn settings_hash(frame: &Frame) -> u64 {
+    let (film, bounds) = (&frame.film, frame.film.bounds());
+    let settings = format!(
+        "{} seed {} resolution {:?} pixels {:?} {:?} channels {:?}",
+        env!("CARGO_PKG_VERSION"),
+        frame.description.seed,
+        film.resolution(),
+        bounds.min,
+        bounds.max,
+        film.aovs(),
+    );
+    job::hash(settings.as_bytes())
+}
+
+fn add_provenance(attributes: &mut Vec<(String, Attribute)>, frame: &Frame) {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    attributes.retain(|(name, _)| name != "DateTime");
+    attributes.push(("DateTime".into(), Attribute::Text(job::exif_date(now))));
+    if let Ok(host) = std::fs::read_to_string("/proc/sys/kernel/hostname") {
+        attributes.push(("HostComputer".into(), Attribute::Text(host.trim().into())));
+    }
+    attributes.push(("renderTimeSeconds".into(), Attribute::Float(frame.statistics.render_seconds as f32)));
+    attributes.push(("tessera/threads".into(), Attribute::Int(frame.statistics.threads as i32)));
+    if let Some(bytes) = stats::peak_memory() {
+        attributes.push(("tessera/peakRSS".into(), Attribute::Text(bytes.to_string())));
+    }
+}
+
+/// What became of the image.
+struct Outcome<'a> {
+    path: &'a Path,
+    losses: Losses,
+    write_seconds: f64,
+}
+
+impl<'a> Outcome<'a> {
+    fn stats(&self, arguments: &'a RenderArguments, frame: &Frame, reporter: &Reporter<'_>) -> Stats<'a> {
+        let (film, description, statistics) = (&frame.film, &frame.description, &frame.statistics);
+        let counters = &statistics.counters;
+        let bounds = film.bounds();
+        let ([x0, y0], [x1, y1]) = (bounds.min, bounds.max);
+        let queries = (counters.closest_hit_rays + counters.shadow_rays) as f64;
+        Stats {
+            version: env!("CARGO_PKG_VERSION"),
+            scene: &arguments.scene,
+            output: self.path,
+            frame: arguments.frame,
+            complete: description.complete(),
+            resolution: film.resolution(),
+            pixel_bounds: [x0, x1, y0, y1],
+            samples: [description.sample_range.start, description.sample_range.end],
+            seed: description.seed,
+            threads: statistics.threads,
+            seconds: Seconds {
+                parse: statistics.parse_seconds,
+                compile: statistics.compile_seconds,
+                render: statistics.render_seconds,
+                write: self.write_seconds,
+                total: reporter.log.elapsed(),
+            },
+            rays: Rays {
+                camera: counters.camera_rays,
+                closest_hit: counters.closest_hit_rays,
+                shadow: counters.shadow_rays,
+                per_second: if statistics.render_seconds > 0.0 { queries / statistics.render_seconds } else { 0.0 },
+            },
+            primitives: Primitives { placed: statistics.primitives, unique: statistics.unique_primitives },
+            memory: Memory {
+                peak_resident_bytes: stats::peak_memory(),
+                embree_bytes: statistics.embree_bytes,
+                film_bytes: statistics.film_bytes,
+            },
+            problems: Problems {
+                warnings: reporter.warnings.load(Ordering::Relaxed),
+                rejected_samples: counters.rejected_samples,
+                negative_pixels: self.losses.clamped_negative,
+                values_beyond_half: self.losses.clamped_half,
+            },
+        }
+    }
+}
+
+/// Sums up for people.
+fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
+    let [start, end] = stats.samples;
+    let asked = &frame.description.sample_range_asked;
+    if !stats.complete {
+        log.warning(&format!(
+            "stopped early: {} of {} samples per pixel were taken",
+            end - start,
+            asked.end - asked.start
+        ));
+    }
+    if stats.problems.rejected_samples > 0 {
+        let share = 100.0 * stats.problems.rejected_samples as f64 / stats.rays.camera.max(1) as f64;
+        log.warning(&format!(
+            "{} samples ({share:.2e} %) were not finite or negative and count as black",
+            stats.problems.rejected_samples
+        ));
+    }
+    if stats.problems.values_beyond_half > 0 {
+        log.warning(&format!("{} values were too large for 16 bits", stats.problems.values_beyond_half));
+    }
+    let [x0, x1, y0, y1] = stats.pixel_bounds;
+    let seconds = &stats.seconds;
+    let memory =
+        stats.memory.peak_resident_bytes.map_or("unknown".into(), |bytes| format!("{:.2} GB", bytes as f64 / 1e9));
+    log.info(&format!(
+        "wrote {}: {} x {} pixels, {} samples each, in {:.2} s (parse {:.2}, build {:.2}, render {:.2}, write {:.2}) on \
+         {} threads; {:.2} million rays a second; peak memory {memory}",
+        stats.output.display(),
+        x1 - x0,
+        y1 - y0,
+        end - start,
+        seconds.total,
+        seconds.parse,
+        seconds.compile,
+        seconds.render,
+        seconds.write,
+        stats.threads,
+        stats.rays.per_second / 1e6,
+    ));
+}
+
+fn judge(arguments: &RenderArguments, stats: &Stats<'_>) -> Result<(), Failure> {
+    let rejected = stats.problems.rejected_samples;
+    if arguments.quality.strict && rejected > 0 {
+        return Err(Failure::Quality(format!("{rejected} samples had to be rejected (--strict)")));
+    }
+    Ok(())
+}

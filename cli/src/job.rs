@@ -1,0 +1,143 @@
+//! What the command line means.
+
+use std::path::{Path, PathBuf};
+
+use crate::args::RenderArguments;
+use crate::exit::Failure;
+use crate::frame_name;
+
+/// This program and its version, for the metadata of files.
+pub fn software() -> String {
+    format!("tessera {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The image that a render writes: its name with the frame number in it.
+///
+/// # Errors
+/// The name is not that of an OpenEXR file.
+pub fn output(arguments: &RenderArguments) -> Result<PathBuf, Failure> {
+    require_extension(
+        &arguments.output,
+        "exr",
+        "a render is written as OpenEXR; \"tessera preview\" makes a PNG of it",
+    )?;
+    Ok(named(&arguments.output, arguments.frame))
+}
+
+/// The name of an output of frame `frame`.
+pub fn named(path: &Path, frame: i32) -> PathBuf {
+    frame_name::with_frame(path, frame)
+}
+
+/// Makes sure that a name ends as the kind of file that will be written.
+///
+/// # Errors
+/// It ends otherwise; `why` says what to do.
+pub fn require_extension(path: &Path, extension: &str, why: &str) -> Result<(), Failure> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(extension)) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!("the output \"{}\" does not end in .{extension}: {why}", path.display())))
+}
+
+/// Makes sure that a slice lies within the samples that are asked for.
+///
+/// # Errors
+/// It does not.
+pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
+    match (&arguments.quality.sample_range, arguments.quality.spp) {
+        (Some(range), Some(spp)) if range.end > spp => Err(Failure::Usage(format!(
+            "--sample-range {}:{} reaches beyond the {spp} samples of --spp",
+            range.start, range.end
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// How many threads to run: what was typed; else what Slurm gave the task; else what the affinity mask and the control
+/// group leave to this process.
+pub fn threads(typed: usize, slurm: Option<&str>) -> usize {
+    if typed > 0 {
+        return typed;
+    }
+    let granted = slurm.and_then(|text| text.trim().parse().ok()).filter(|&threads| threads > 0);
+    granted.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
+}
+
+/// A hash that tells settings apart. Not one that withstands an adversary.
+///
+/// **Source**: FNV-1a, 64 bits.
+pub fn hash(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// What Slurm gives the task, as [`threads`] takes it.
+pub fn slurm() -> Option<String> {
+    std::env::var("SLURM_CPUS_PER_TASK").ok()
+}
+
+/// The date that goes into files, as EXIF writes it, in UTC: of SOURCE_DATE_EPOCH, else of the Unix epoch, so that the
+/// same job gives the same bytes.
+pub fn date(source_date_epoch: Option<&str>) -> String {
+    let seconds = source_date_epoch.and_then(|text| text.trim().parse().ok()).unwrap_or(0);
+    exif_date(seconds)
+}
+
+/// Seconds since 1970 as `YYYY:MM:DD HH:MM:SS`.
+///
+/// **Source**: \[Hinnant13\], "days to civil".
+pub fn exif_date(seconds: u64) -> String {
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Years from March, in eras of 400: the leap day comes last.
+    let since = days + 719_468;
+    let (era, day_of_era) = (since / 146_097, since % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = 400 * era + year_of_era + u64::from(month <= 2);
+    format!("{year:04}:{month:02}:{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_are_typed_or_granted_or_counted() {
+        assert_eq!(threads(3, Some("5")), 3);
+        assert_eq!(threads(0, Some("5")), 5);
+        let counted = std::thread::available_parallelism().unwrap().get();
+        for none in [None, Some(""), Some("0"), Some("-2"), Some("all")] {
+            assert_eq!(threads(0, none), counted, "{none:?}");
+        }
+    }
+
+    /// Vectors of the algorithm's authors.
+    #[test]
+    fn hashes_are_fnv_1a() {
+        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
+        assert_eq!(hash(b"foobar"), 0x8594_4171_f739_67e8);
+    }
+
+    /// The dates are those that `date -u -d @N` prints.
+    #[test]
+    fn dates_are_civil() {
+        for (seconds, date) in [
+            (0, "1970:01:01 00:00:00"),
+            (951_782_399, "2000:02:28 23:59:59"),
+            (951_782_400, "2000:02:29 00:00:00"),
+            (1_709_251_199, "2024:02:29 23:59:59"),
+            (1_709_251_200, "2024:03:01 00:00:00"),
+            (1_735_689_599, "2024:12:31 23:59:59"),
+            (4_107_542_400, "2100:03:01 00:00:00"),
+        ] {
+            assert_eq!(exif_date(seconds), date);
+        }
+        assert_eq!(date(None), "1970:01:01 00:00:00");
+        assert_eq!(date(Some("x")), "1970:01:01 00:00:00");
+        assert_eq!(date(Some("951782400")), "2000:02:29 00:00:00");
+    }
+}

@@ -1,0 +1,136 @@
+//! What a render took, as a JSON file.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+/// The file of `--stats`. Keys are part of the program's interface: they may be added to, not renamed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stats<'a> {
+    /// Version of the program.
+    pub version: &'static str,
+    /// The scene file.
+    pub scene: &'a Path,
+    /// The image.
+    pub output: &'a Path,
+    /// Frame number.
+    pub frame: i32,
+    /// Whether all samples were taken.
+    pub complete: bool,
+    /// Size of the whole frame.
+    pub resolution: [u32; 2],
+    /// The pixels that were rendered, x0 x1 y0 y1, upper ends exclusive.
+    pub pixel_bounds: [u32; 4],
+    /// The samples that were taken of each pixel, upper end exclusive.
+    pub samples: [u64; 2],
+    /// Seed.
+    pub seed: u64,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Times.
+    pub seconds: Seconds,
+    /// What was traced.
+    pub rays: Rays,
+    /// Geometry.
+    pub primitives: Primitives,
+    /// Memory.
+    pub memory: Memory,
+    /// What was not as it should be.
+    pub problems: Problems,
+}
+
+/// Wall-clock seconds of the phases.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Seconds {
+    /// Reading the scene's files.
+    pub parse: f64,
+    /// Building the world.
+    pub compile: f64,
+    /// Tracing.
+    pub render: f64,
+    /// Writing the image.
+    pub write: f64,
+    /// From the start of the program.
+    pub total: f64,
+}
+
+/// Numbers of rays.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Rays {
+    /// Paths begun.
+    pub camera: u64,
+    /// Queries for the closest hit, camera rays included.
+    pub closest_hit: u64,
+    /// Queries for any hit.
+    pub shadow: u64,
+    /// All queries in a second of rendering.
+    pub per_second: f64,
+}
+
+/// Numbers of triangles and other primitives.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Primitives {
+    /// Instances counted each time they are placed.
+    pub placed: u64,
+    /// In memory.
+    pub unique: u64,
+}
+
+/// Bytes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Memory {
+    /// Largest resident set of the process; `null` if the system does not say.
+    pub peak_resident_bytes: Option<u64>,
+    /// What Embree held at most.
+    pub embree_bytes: u64,
+    /// The film.
+    pub film_bytes: u64,
+}
+
+/// Counts of what was not as it should be.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Problems {
+    /// Messages that the picture is not quite what the scene asks for.
+    pub warnings: u64,
+    /// Samples that came out not finite or negative, and count as black.
+    pub rejected_samples: u64,
+    /// Pixels that negative lobes of the pixel filter had made negative, written as 0.
+    pub negative_pixels: u64,
+    /// Values too large for 16 bits, written as the largest that fits.
+    pub values_beyond_half: u64,
+}
+
+/// Largest resident set of this process so far, bytes.
+pub fn peak_memory() -> Option<u64> {
+    status("VmHWM:")
+}
+
+/// Resident set of this process now, bytes.
+pub fn resident_memory() -> Option<u64> {
+    status("VmRSS:")
+}
+
+fn status(key: &str) -> Option<u64> {
+    parse_status(&std::fs::read_to_string("/proc/self/status").ok()?, key)
+}
+
+/// A size in the text of `/proc/PID/status`, which gives them in units of 1024 bytes: proc(5).
+fn parse_status(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
+    let kilobytes: u64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
+    kilobytes.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_read_from_the_status_file() {
+        let text = "Name:\tVmHWM: 7 kB\nVmPeak:\t  999 kB\nVmHWM:\t    2048 kB\nVmRSS:\tnone\n";
+        assert_eq!(parse_status(text, "VmHWM:"), Some(2 << 20));
+        assert_eq!(parse_status(text, "VmRSS:"), None);
+        assert_eq!(parse_status(text, "VmSwap:"), None);
+        assert!(peak_memory() >= resident_memory());
+    }
+}

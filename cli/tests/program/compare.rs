@@ -1,0 +1,72 @@
+//! `tessera compare`.
+
+use super::{Bench, read};
+
+#[test]
+fn figures_are_those_of_the_formulas() {
+    let bench = Bench::new();
+    bench.write_image("image.exr", 64, 32, |_, _| [1.5, 1.0, 2.0]);
+    bench.write_image("reference.exr", 64, 32, |_, _| [1.0, 1.0, 1.0]);
+    let figures = bench.succeed(&["compare", "image.exr", "reference.exr", "--format", "json"]).json();
+    let number = |key: &str| figures[key].as_f64().unwrap();
+    assert!((number("relmse") - (0.25 + 1.0) / 3.0 / 1.01).abs() < 1e-9, "{figures}");
+    assert!((number("rmse") - (1.25_f64 / 3.0).sqrt()).abs() < 1e-9, "{figures}");
+    assert!((number("block_difference") - 0.5).abs() < 1e-9, "{figures}");
+    assert_eq!(number("max_difference"), 1.0);
+    assert_eq!(figures["mean_ratio"], serde_json::json!([1.5, 1.0, 2.0]));
+    assert_eq!(figures["resolution"], serde_json::json!([64, 32]));
+    let text = bench.succeed(&["compare", "image.exr", "reference.exr"]).stdout;
+    assert!(text.contains("relMSE") && text.contains("1.50000"), "{text}");
+}
+
+#[test]
+fn thresholds_decide_the_exit_code() {
+    let bench = Bench::new();
+    bench.write_image("image.exr", 64, 32, |_, _| [1.1; 3]);
+    bench.write_image("reference.exr", 64, 32, |_, _| [1.0; 3]);
+    let with = |flag: &'static str, limit: &'static str| ["compare", "image.exr", "reference.exr", flag, limit];
+    // relMSE 0.01 / 1.01; means and blocks 0.1.
+    for (flag, below, above) in [
+        ("--max-relmse", "0.00990", "0.00991"),
+        ("--max-mean-difference", "0.0999", "0.1001"),
+        ("--max-block-difference", "0.0999", "0.1001"),
+    ] {
+        let run = bench.fail(&with(flag, below), 5, &["above", below]);
+        assert!(run.stdout.contains("relMSE"), "the figures are missing: {}", run.stdout);
+        bench.succeed(&with(flag, above));
+    }
+}
+
+#[test]
+fn the_difference_image_keeps_size_and_sign() {
+    let bench = Bench::new();
+    bench.write_image("image.exr", 5, 4, |x, y| [x as f32, y as f32, 1.0]);
+    bench.write_image("reference.exr", 5, 4, |_, _| [2.0, 0.5, 1.0]);
+    bench.succeed(&["compare", "image.exr", "reference.exr", "-o", "difference.exr"]);
+    let image = read(&bench.path("difference.exr"));
+    let value = |x: usize, y: usize, name: &str| {
+        image.pixels[(y * image.width + x) * image.channels.len() + image.channel(name).unwrap()]
+    };
+    assert_eq!((value(0, 3, "R"), value(0, 3, "signed.R")), (2.0, -2.0));
+    assert_eq!((value(4, 0, "G"), value(4, 0, "signed.G")), (0.5, -0.5));
+    assert_eq!(value(1, 1, "signed.B"), 0.0);
+    assert_eq!(bench.files(), ["difference.exr", "image.exr", "reference.exr"]);
+}
+
+#[test]
+fn what_cannot_be_compared_exits_with_3() {
+    let bench = Bench::new();
+    bench.write_image("a.exr", 5, 4, |_, _| [1.0; 3]);
+    bench.write_image("b.exr", 4, 5, |_, _| [1.0; 3]);
+    bench.fail(&["compare", "a.exr", "b.exr"], 3, &["5 x 4", "4 x 5"]);
+    bench.fail(&["compare", "a.exr", "a.exr", "--layer", "albedo"], 3, &["albedo", "it has R G B"]);
+}
+
+#[test]
+fn pixels_that_are_not_finite_fail_the_comparison() {
+    let bench = Bench::new();
+    bench.write_image("a.exr", 8, 8, |x, y| if x + y == 0 { [f32::NAN, 1.0, 1.0] } else { [1.0; 3] });
+    bench.write_image("b.exr", 8, 8, |_, _| [1.0; 3]);
+    let run = bench.fail(&["compare", "a.exr", "b.exr"], 5, &["not finite"]);
+    assert!(run.stdout.contains("1 in the image, 0 in the reference"), "{}", run.stdout);
+}

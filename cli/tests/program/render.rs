@@ -1,0 +1,191 @@
+//! `tessera render`.
+
+use super::{Bench, Run, SCENE, read};
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", SCENE);
+    bench
+}
+
+fn bytes(bench: &Bench, name: &str) -> Vec<u8> {
+    std::fs::read(bench.path(name)).unwrap()
+}
+
+#[test]
+fn a_render_writes_the_image_and_nothing_else() {
+    let bench = bench();
+    let run = bench.succeed(&["render", "scene.pbrt", "-o", "out.exr"]);
+    assert_eq!(bench.files(), ["out.exr", "scene.pbrt"]);
+    let image = read(&bench.path("out.exr"));
+    assert_eq!((image.width, image.height), (48, 32));
+    assert_eq!(image.channels, ["R", "G", "B", "A"]);
+    assert!(image.pixels.iter().all(|value| value.is_finite()));
+    let mean = image.pixels.iter().sum::<f32>() / image.pixels.len() as f32;
+    assert!(mean > 0.1, "the image is black: {mean}");
+    // Not a terminal: machine lines, the last of them only now that the file is in its place.
+    let lines: Vec<_> = run.stdout.lines().collect();
+    assert_eq!(lines[0], "ALF_PROGRESS 0%");
+    let [image, memory, last] = lines[lines.len() - 3..] else { panic!("{lines:?}") };
+    assert_eq!((image, last), ("Image: out.exr", "Finished Rendering"));
+    let size = memory.strip_prefix("Peak Memory Usage: ").and_then(|rest| rest.strip_suffix(" GB"));
+    assert!(size.is_some_and(|size| size.parse::<f64>().unwrap() > 0.0), "{memory}");
+    assert_eq!(lines[lines.len() - 4], "ALF_PROGRESS 100%");
+    assert!(run.stderr.contains("wrote out.exr: 48 x 32 pixels, 4 samples each"), "{}", run.stderr);
+}
+
+#[test]
+fn the_same_job_gives_the_same_bytes_on_any_number_of_threads() {
+    let bench = bench();
+    for (threads, name) in [("1", "a.exr"), ("2", "b.exr"), ("3", "c.exr")] {
+        bench.succeed(&["render", "scene.pbrt", "-o", name, "-t", threads, "--aov", "all", "--progress", "none"]);
+    }
+    assert!(bytes(&bench, "a.exr") == bytes(&bench, "b.exr") && bytes(&bench, "a.exr") == bytes(&bench, "c.exr"));
+    bench.succeed(&["render", "scene.pbrt", "-o", "d.exr", "--aov", "all", "--seed", "77"]);
+    assert!(bytes(&bench, "a.exr") != bytes(&bench, "d.exr"));
+}
+
+#[test]
+fn crops_are_the_same_pixels_in_a_window_of_the_frame() {
+    let bench = bench();
+    bench.succeed(&["render", "scene.pbrt", "-o", "full.exr"]);
+    bench.succeed(&["render", "scene.pbrt", "-o", "crop.exr", "--crop", "0.25,0.75,0.5,1"]);
+    bench.succeed(&["render", "scene.pbrt", "-o", "bounds.exr", "--pixel-bounds", "12,36,16,32"]);
+    let (full, crop, bounds) =
+        (read(&bench.path("full.exr")), read(&bench.path("crop.exr")), read(&bench.path("bounds.exr")));
+    assert_eq!(crop.pixels, bounds.pixels);
+    assert_eq!((crop.data_window.x, crop.data_window.y, crop.width, crop.height), (12, 16, 24, 16));
+    assert_eq!(crop.display_window, full.display_window);
+    let channels = full.channels.len();
+    for y in 0..16 {
+        let row = &full.pixels[((y + 16) * 48 + 12) * channels..][..24 * channels];
+        assert_eq!(row, &crop.pixels[y * 24 * channels..][..24 * channels], "row {y}");
+    }
+}
+
+#[test]
+fn metadata_says_what_was_rendered_and_no_more() {
+    let bench = bench();
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--spp", "8", "--sample-range", "2:5", "--seed", "9"]);
+    let image = read(&bench.path("a.exr"));
+    let text = |key: &str| match image.attribute(key) {
+        Some(oiio::Attribute::Text(text)) => text.clone(),
+        other => panic!("{key}: {other:?}"),
+    };
+    assert_eq!(text("tessera/sampleRange"), "2:5");
+    assert_eq!(text("tessera/seed"), "9");
+    assert_eq!(text("DateTime"), "1970:01:01 00:00:00");
+    assert_eq!(text("tessera/sceneHash").len(), 16);
+    assert_eq!(image.attribute("tessera/complete"), Some(&oiio::Attribute::Int(1)));
+    assert_eq!(image.attribute("samplesPerPixel"), Some(&oiio::Attribute::Int(3)));
+    for private in ["HostComputer", "renderTimeSeconds", "tessera/peakRSS", "tessera/threads"] {
+        assert_eq!(image.attribute(private), None, "{private}");
+    }
+    // Slices of one picture share the hash of its settings; another size does not.
+    let settings = text("tessera/settingsHash");
+    bench.succeed(&["render", "scene.pbrt", "-o", "b.exr", "--sample-range", "5:8", "--seed", "9"]);
+    bench.succeed(&["render", "scene.pbrt", "-o", "c.exr", "--seed", "9", "--resolution", "24x16"]);
+    let hash = |name: &str| read(&bench.path(name)).attribute("tessera/settingsHash").cloned();
+    assert_eq!(hash("b.exr"), Some(oiio::Attribute::Text(settings.clone())));
+    assert_ne!(hash("c.exr"), Some(oiio::Attribute::Text(settings)));
+}
+
+#[test]
+fn provenance_and_the_date_are_recorded_when_asked_for() {
+    let bench = bench();
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--provenance"]);
+    let image = read(&bench.path("a.exr"));
+    for key in ["HostComputer", "renderTimeSeconds", "tessera/peakRSS", "tessera/threads"] {
+        assert!(image.attribute(key).is_some(), "{key}");
+    }
+    assert_ne!(image.attribute("DateTime"), Some(&oiio::Attribute::Text("1970:01:01 00:00:00".into())));
+    let dated = bench.command(&["render", "scene.pbrt", "-o", "b.exr"]).env("SOURCE_DATE_EPOCH", "951782400").output();
+    assert_eq!(Run::of(dated.unwrap()).code, 0);
+    let date = oiio::Attribute::Text("2000:02:29 00:00:00".into());
+    assert_eq!(read(&bench.path("b.exr")).attribute("DateTime"), Some(&date));
+}
+
+#[test]
+fn frame_numbers_go_into_all_names() {
+    let bench = bench();
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.####.exr", "--frame", "12", "--stats", "a.%03d.json"]);
+    assert_eq!(bench.files(), ["a.0012.exr", "a.012.json", "scene.pbrt"]);
+    let stats: serde_json::Value = serde_json::from_slice(&bytes(&bench, "a.012.json")).unwrap();
+    assert_eq!((&stats["frame"], &stats["output"]), (&12.into(), &"a.0012.exr".into()));
+    assert_eq!(stats["complete"], true);
+    assert_eq!(stats["samples"], serde_json::json!([0, 4]));
+    assert_eq!(stats["rays"]["camera"], 48 * 32 * 4);
+    assert_eq!(stats["problems"]["rejected_samples"], 0);
+    assert!(stats["seconds"]["total"].as_f64().unwrap() > 0.0);
+    assert!(stats["memory"]["peak_resident_bytes"].as_u64().unwrap() > 1 << 20);
+}
+
+#[test]
+fn each_kind_of_progress_keeps_to_its_stream() {
+    let bench = bench();
+    let render = |kind: &str| bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--progress", kind]);
+    assert_eq!(render("none").stdout, "");
+    assert_eq!(render("bar").stdout, "");
+    let openjd = render("openjd").stdout;
+    assert!(openjd.lines().all(|line| line.starts_with("openjd_")), "{openjd}");
+    assert_eq!(openjd.lines().last(), Some("openjd_progress: 100.0"));
+    let events: Vec<serde_json::Value> =
+        render("json").stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<_> = events.iter().map(|event| event["event"].as_str().unwrap()).collect();
+    assert_eq!(names.last(), Some(&"finished"));
+    assert_eq!(names[names.len() - 2], "image");
+    let percents: Vec<f64> = events.iter().filter_map(|event| event["percent"].as_f64()).collect();
+    assert!(percents.is_sorted() && percents.last() == Some(&100.0), "{percents:?}");
+}
+
+#[test]
+fn slurm_decides_the_threads_unless_the_command_line_does() {
+    let bench = bench();
+    let threads = |arguments: &[&str]| {
+        let mut command = bench.command(&["render", "scene.pbrt", "-o", "a.exr", "--stats", "s.json"]);
+        let output = command.args(arguments).env("SLURM_CPUS_PER_TASK", "3").output().unwrap();
+        assert_eq!(Run::of(output).code, 0);
+        serde_json::from_slice::<serde_json::Value>(&bytes(&bench, "s.json")).unwrap()["threads"].as_u64()
+    };
+    assert_eq!(threads(&[]), Some(3));
+    assert_eq!(threads(&["--threads", "2"]), Some(2));
+}
+
+#[test]
+fn a_time_limit_ends_a_long_render_early_and_says_so() {
+    let bench = bench();
+    let run = bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--spp", "100000000", "--time-limit", "0.2s"]);
+    assert!(run.stderr.contains("stopped early"), "{}", run.stderr);
+    assert!(run.stdout.contains("ALF_PROGRESS 100%"), "{}", run.stdout);
+    let image = read(&bench.path("a.exr"));
+    assert_eq!(image.attribute("tessera/complete"), Some(&oiio::Attribute::Int(0)));
+    let samples = image.attribute("samplesPerPixel");
+    assert!(matches!(samples, Some(oiio::Attribute::Int(1..100_000_000))), "{samples:?}");
+}
+
+#[test]
+fn a_wrong_scene_exits_with_3_shows_every_error_and_leaves_the_old_image() {
+    let bench = bench();
+    bench.write("a.exr", "old");
+    bench.write("wrong.pbrt", "Camera \"perspective\"\nWorldBegin\nShape \"cone\"\nMaterial \"mud\"\n");
+    let run =
+        bench.fail(&["render", "wrong.pbrt", "-o", "a.exr"], 3, &["wrong.pbrt:3:", "cone", "wrong.pbrt:4:", "mud"]);
+    assert!(!run.stdout.contains("100%") && !run.stdout.contains("Finished"), "{}", run.stdout);
+    assert_eq!(bytes(&bench, "a.exr"), b"old");
+    let run = bench.run(&["render", "wrong.pbrt", "-o", "a.exr", "--progress", "openjd"]);
+    assert!(run.stdout.lines().any(|line| line.starts_with("openjd_fail: ")), "{}", run.stdout);
+    let run = bench.run(&["render", "wrong.pbrt", "-o", "a.exr", "--progress", "json"]);
+    let last: serde_json::Value = serde_json::from_str(run.stdout.lines().last().unwrap()).unwrap();
+    assert_eq!((&last["event"], &last["exit_code"]), (&"failed".into(), &3.into()));
+}
+
+#[test]
+fn names_in_a_scene_cannot_forge_progress() {
+    let bench = bench();
+    let forged = "Material \"diffuse\" \"float ALF_PROGRESS 99% openjd_fail: Finished Rendering\" 1\nWorldBegin\n";
+    bench.write("forged.pbrt", &format!("{forged}{SCENE}"));
+    let run = bench.run(&["render", "forged.pbrt", "-o", "a.exr", "-v"]);
+    for word in ["ALF_PROGRESS 99%", "openjd_fail", "Finished Rendering"] {
+        assert!(!run.stderr.contains(word), "{}", run.stderr);
+    }
+}

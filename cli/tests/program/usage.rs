@@ -1,0 +1,90 @@
+//! Wrong and unusual command lines.
+
+use super::Bench;
+
+#[test]
+fn help_names_commands_exit_codes_and_examples() {
+    let bench = Bench::new();
+    let help = bench.succeed(&["--help"]).stdout;
+    for word in ["render", "info", "compare", "preview", "Exit codes"] {
+        assert!(help.contains(word), "{help}");
+    }
+    let help = bench.succeed(&["render", "--help"]).stdout;
+    for word in ["Examples:", "--sample-range", "--time-limit", "SOURCE_DATE_EPOCH", "openjd"] {
+        assert!(help.contains(word), "{help}");
+    }
+    assert!(bench.succeed(&["--version"]).stdout.starts_with("tessera "));
+}
+
+#[test]
+fn a_wrong_command_line_exits_with_2_and_says_why() {
+    let bench = Bench::new();
+    bench.fail(&[], 2, &["Usage"]);
+    bench.fail(&["bake"], 2, &["bake"]);
+    bench.fail(&["render"], 2, &["--output", "<SCENE>"]);
+    bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--sppp", "4"], 2, &["--sppp", "--spp"]);
+    for (flag, value, words) in [
+        ("--spp", "0", ["--spp", "0"]),
+        ("--resolution", "640", ["--resolution", "1280x720"]),
+        ("--crop", "0,1,0,2", ["--crop", "X0 < X1 <= 1"]),
+        ("--pixel-bounds", "0,0,0,1", ["--pixel-bounds", "X0 < X1"]),
+        ("--sample-range", "4:4", ["4:4", "no sample"]),
+        ("--time-limit", "soon", ["--time-limit", "10m"]),
+        ("--aov", "albedo,beauty", ["beauty", "sampleCount"]),
+        ("--progress", "loud", ["loud", "openjd"]),
+        ("--threads", "many", ["--threads", "many"]),
+    ] {
+        bench.fail(&["render", "a.pbrt", "-o", "a.exr", flag, value], 2, &words);
+    }
+    bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--crop", "0,1,0,1", "--pixel-bounds", "0,1,0,1"], 2, &["--crop"]);
+    bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--spp", "8", "--sample-range", "0:9"], 2, &["0:9", "--spp"]);
+    bench.fail(&["info", "a.pbrt", "-v", "-q"], 2, &["--verbose"]);
+}
+
+#[test]
+fn outputs_are_checked_before_anything_is_read() {
+    let bench = Bench::new();
+    bench.write("file", "");
+    // The scene does not exist, which would be exit code 3.
+    bench.fail(&["render", "none.pbrt", "-o", "a.png"], 2, &["a.png", ".exr", "tessera preview"]);
+    bench.fail(&["render", "none.pbrt", "-o", "none/a.exr"], 4, &["none/a.exr", "does not exist"]);
+    bench.fail(&["render", "none.pbrt", "-o", "file/a.exr"], 4, &["file/a.exr"]);
+    bench.fail(&["render", "none.pbrt", "-o", "a.exr", "--stats", "none/s.json"], 4, &["none/s.json"]);
+    bench.fail(&["render", "none.pbrt", "-o", "a.exr", "--log-file", "none/log"], 4, &["none/log"]);
+    bench.fail(&["preview", "none.exr", "-o", "a.jpg"], 2, &["a.jpg", ".png"]);
+    bench.fail(&["compare", "none.exr", "none.exr", "-o", "a.png"], 2, &["a.png", ".exr"]);
+    assert_eq!(bench.files(), ["file"]);
+}
+
+#[test]
+fn a_missing_input_exits_with_3_and_names_it() {
+    let bench = Bench::new();
+    bench.write("no.exr", "this is no image");
+    bench.fail(&["render", "none.pbrt", "-o", "a.exr"], 3, &["none.pbrt", "Error: "]);
+    bench.fail(&["info", "none.pbrt"], 3, &["none.pbrt", "Error: "]);
+    bench.fail(&["compare", "none.exr", "no.exr"], 3, &["none.exr"]);
+    bench.fail(&["compare", "no.exr", "no.exr"], 3, &["no.exr"]);
+    bench.fail(&["preview", "no.exr", "-o", "a.png"], 3, &["no.exr"]);
+    assert_eq!(bench.files(), ["no.exr"]);
+}
+
+#[test]
+fn quiet_says_nothing_but_errors_and_the_log_file_everything() {
+    let bench = Bench::new();
+    bench.write_image("a.exr", 4, 4, |_, _| [0.5; 3]);
+    let run = bench.succeed(&["preview", "a.exr", "-o", "a.png", "--quiet", "--log-file", "log"]);
+    assert_eq!((run.stdout.as_str(), run.stderr.as_str()), ("", ""));
+    let run = bench.run(&["preview", "none.exr", "-o", "b.png", "--quiet", "--log-file", "log"]);
+    assert!(run.stderr.starts_with("Error: ") && run.stderr.lines().count() == 1, "{}", run.stderr);
+    let log = std::fs::read_to_string(bench.path("log")).unwrap();
+    assert!(log.contains("info: wrote a.png") && log.contains("error: cannot open"), "{log}");
+}
+
+#[test]
+fn file_names_cannot_forge_lines() {
+    let bench = Bench::new();
+    let name = "x\nALF_PROGRESS 99%\nopenjd_progress: 50.exr";
+    let run = bench.fail(&["preview", name, "-o", "a.png"], 3, &["ALF-PROGRESS"]);
+    let forged = |line: &str| line.contains("ALF_PROGRESS") || line.starts_with("openjd_");
+    assert!(!run.stderr.lines().any(forged), "{}", run.stderr);
+}
