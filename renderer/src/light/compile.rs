@@ -17,7 +17,8 @@ use crate::math::{Rgb, luminance};
 use crate::scene::Span;
 use crate::scene::description::{self, AreaLightId};
 use crate::shape::Shape;
-use crate::texture::{RgbImage, load_rgb};
+use crate::texture::RgbImage;
+use crate::texture::image::{Channels, load_texels};
 
 /// A message and the place in the scene file that it is about.
 pub type Message = (Span, String);
@@ -44,16 +45,16 @@ impl Lights {
         emitters: Vec<Emitter>,
         scene_bounds: (Vec3, Vec3),
     ) -> Result<(Self, Vec<Message>), Vec<Message>> {
-        Self::build_with(lights, area, emitters, scene_bounds, |path| load_rgb(path))
+        Self::build_with(lights, area, emitters, scene_bounds, load)
     }
 
-    /// As [`Self::build`], with images from `load`.
+    /// As [`Self::build`], with images from `load`: see [`load`].
     pub(super) fn build_with(
         lights: &[description::Light],
         area: &[description::AreaLight],
         emitters: Vec<Emitter>,
         scene_bounds: (Vec3, Vec3),
-        load: impl Fn(&Path) -> Result<RgbImage, String>,
+        load: impl Fn(&Path) -> Loaded,
     ) -> Result<(Self, Vec<Message>), Vec<Message>> {
         let mut compiler = Compiler {
             load,
@@ -76,6 +77,20 @@ impl Lights {
     }
 }
 
+/// An image, and how many of its values were not finite and became 0; or why there is none.
+pub(super) type Loaded = Result<(RgbImage, usize), String>;
+
+/// Loads an image file: integers are sRGB, floats are linear.
+fn load(path: &Path) -> Loaded {
+    let texels = load_texels(path, Channels::Rgb, None)?;
+    let rgb = |i: usize| match texels.channels {
+        1 => Rgb::splat(texels.value(i)),
+        _ => Rgb::from_array(std::array::from_fn(|c| texels.value(3 * i + c))),
+    };
+    let pixels = (0..texels.width * texels.height).map(rgb).collect();
+    Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.replaced))
+}
+
 struct Compiler<Load> {
     load: Load,
     /// What each file held, `None`: it was no use, which has been said.
@@ -85,18 +100,21 @@ struct Compiler<Load> {
     built: Lights,
 }
 
-impl<Load: Fn(&Path) -> Result<RgbImage, String>> Compiler<Load> {
+impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
     /// The image at `path`. `None`: there is an error about it.
     fn image(&mut self, path: &Path, span: Span) -> Option<Arc<LightImage>> {
         if let Some(known) = self.images.get(path) {
             return known.clone();
         }
-        let loaded = (self.load)(path)
-            .and_then(|image| LightImage::new(image).ok_or_else(|| format!("\"{}\" has no pixels", path.display())));
+        let loaded = (self.load)(path).and_then(|(image, replaced)| {
+            let (image, unusable) =
+                LightImage::new(image).ok_or_else(|| format!("\"{}\" has no pixels", path.display()))?;
+            Ok((image, replaced + unusable))
+        });
         let image = match loaded {
             Ok((image, unusable)) => {
                 if unusable > 0 {
-                    let what = "pixels are negative, infinite or not a number; such values count as 0";
+                    let what = "values are negative, infinite or not a number, and count as 0";
                     self.warnings.push((span, format!("\"{}\": {unusable} {what}", path.display())));
                 }
                 Some(Arc::new(image))

@@ -17,8 +17,8 @@ pub struct LightImage {
 const LARGEST: f32 = f32::MAX / 8.0;
 
 impl LightImage {
-    /// Takes over `image` and returns also how many of its texels held a value that is negative, infinite or not a
-    /// number. Such a value counts as 0. `None`: there is no texel.
+    /// Takes over `image` and returns also how many of its values are negative, infinite or not a number. Those count as
+    /// 0. `None`: there is no texel.
     pub fn new(image: RgbImage) -> Option<(Self, usize)> {
         let RgbImage { width, height, mut pixels } = image;
         if width == 0 || height == 0 || pixels.len() != width * height {
@@ -27,7 +27,7 @@ impl LightImage {
         let mut unusable = 0;
         for texel in &mut pixels {
             let clean = Rgb::from_array(texel.to_array().map(|v| if (0.0..=LARGEST).contains(&v) { v } else { 0.0 }));
-            unusable += usize::from(clean != *texel);
+            unusable += clean.cmpne(*texel).bitmask().count_ones() as usize;
             *texel = clean;
         }
         Some((Self { width, height, texels: pixels.into() }, unusable))
@@ -97,7 +97,7 @@ mod tests {
     fn unusable_texels_are_zeroed_and_counted() {
         let pixels = vec![Rgb::new(1.0, f32::NAN, 2.0), Rgb::splat(-1.0), Rgb::splat(f32::INFINITY), Rgb::ONE];
         let (image, unusable) = LightImage::new(RgbImage { width: 2, height: 2, pixels }).unwrap();
-        assert_eq!(unusable, 3);
+        assert_eq!(unusable, 7);
         assert_eq!(image.texels(), [Rgb::new(1.0, 0.0, 2.0), Rgb::ZERO, Rgb::ZERO, Rgb::ONE]);
         assert_eq!(image.mean(), DVec3::new(0.5, 0.25, 0.75));
         assert!(LightImage::new(RgbImage { width: 0, height: 3, pixels: vec![] }).is_none());

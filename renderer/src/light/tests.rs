@@ -27,10 +27,10 @@ fn area_light(radiance: Rgb) -> AreaLight {
 }
 
 /// Images by name, as a file system would hold them.
-fn load(path: &Path) -> Result<RgbImage, String> {
+fn load(path: &Path) -> compile::Loaded {
     let square = |size: usize, texel: &dyn Fn(usize, usize) -> Rgb| {
         let pixels = (0..size * size).map(|i| texel(i % size, i / size)).collect();
-        Ok(RgbImage { width: size, height: size, pixels })
+        Ok((RgbImage { width: size, height: size, pixels }, 0))
     };
     match path.to_str().unwrap() {
         "sky" => square(16, &|x, y| match (x, y) {
@@ -40,7 +40,7 @@ fn load(path: &Path) -> Result<RgbImage, String> {
         "black" => square(4, &|_, _| Rgb::ZERO),
         "bad" => square(2, &|x, y| [Rgb::ONE, Rgb::NAN, Rgb::NEG_X, Rgb::ONE][2 * y + x]),
         "poster" => square(2, &|x, y| Rgb::new(1.0 + x as f32, 1.0 + y as f32, 1.0)),
-        "wide" => Ok(RgbImage { width: 2, height: 1, pixels: vec![Rgb::ONE; 2] }),
+        "wide" => Ok((RgbImage { width: 2, height: 1, pixels: vec![Rgb::ONE; 2] }, 0)),
         _ => Err(format!("\"{}\": no such file", path.display())),
     }
 }
@@ -549,7 +549,7 @@ fn what_is_changed_is_warned_about() {
     ];
     let (built, warnings) = Lights::build_with(&lights, &[], vec![], BOUNDS, load).unwrap();
     assert_eq!(warnings.len(), 4, "{warnings:?}");
-    assert!(warnings[0].1.contains("2 pixels"), "{warnings:?}");
+    assert!(warnings[0].1.contains("4 values"), "{warnings:?}");
     assert_eq!(built.points[0].intensity(Vec3::X), Rgb::new(1.0, 0.0, 3.0));
     let seen = built.escaped(Vec3::X, None, 0.0);
     assert!(seen.is_finite());
@@ -564,4 +564,30 @@ fn the_result_does_not_depend_on_how_often_it_is_built() {
         let (u, v) = (random.unit(), random.square());
         assert_eq!(a.sample(&from, u, v), b.sample(&from, u, v));
     }
+}
+
+#[test]
+fn image_files_are_loaded_and_their_broken_values_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("env.exr");
+    let texels = [1.0, f32::NAN, 3.0, 4.0, f32::INFINITY, 6.0, -7.0, 8.0, 9.0, 10.0, 11.0, 12.0];
+    let window = oiio::Window::at_origin(2, 2);
+    let channel = |name: &str| oiio::Channel { name: name.to_owned(), format: oiio::Format::Float };
+    let output = oiio::Output {
+        path: &path,
+        file_format: oiio::FileFormat::Exr,
+        data_window: window,
+        display_window: window,
+        channels: ["R", "G", "B"].map(channel).to_vec(),
+        pixels: &texels,
+        attributes: vec![],
+        compression: oiio::Compression::default(),
+    };
+    oiio::write(&output).unwrap();
+    let kind = LightKind::Infinite { radiance: Rgb::ONE, image: Some(path), illuminance: None, portal: vec![] };
+    let (lights, warnings) = Lights::build(&[light(kind)], &[], vec![], BOUNDS).unwrap();
+    assert!(warnings[0].1.contains("env.exr") && warnings[0].1.contains("3 values"), "{warnings:?}");
+    let seen = |u: f32, v: f32| lights.escaped(octahedral::direction_from_square(Vec2::new(u, v)), None, 0.0);
+    assert_eq!((seen(0.2, 0.2), seen(0.7, 0.2)), (Rgb::new(1.0, 0.0, 3.0), Rgb::new(4.0, 0.0, 6.0)));
+    assert_eq!((seen(0.2, 0.7), seen(0.7, 0.7)), (Rgb::new(0.0, 8.0, 9.0), Rgb::new(10.0, 11.0, 12.0)));
 }

@@ -11,11 +11,10 @@ use super::super::image::LightImage;
 use super::super::infinite::Infinite;
 use super::super::point::{Emission, Goniometric, PointLight, Projection, Spot};
 use super::super::tree::build::Candidate;
-use super::{Compiler, candidates, luminance_f64, scaled, with_total};
+use super::{Compiler, Loaded, candidates, luminance_f64, scaled, with_total};
 use crate::math::{Rgb, Transform};
 use crate::scene::Span;
 use crate::scene::description::{Light, LightKind};
-use crate::texture::RgbImage;
 
 /// Where a light is described and stands.
 struct Place<'a> {
@@ -24,7 +23,7 @@ struct Place<'a> {
     light_from_world: DMat3,
 }
 
-impl<Load: Fn(&Path) -> Result<RgbImage, String>> Compiler<Load> {
+impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
     /// Takes over a light and returns how it may be chosen, if it has a place in the scene.
     pub(super) fn light(&mut self, light: &Light) -> Option<Candidate> {
         let span = light.span;
