@@ -399,6 +399,28 @@ mod tests {
     }
 
     #[test]
+    fn messages_name_the_flag_and_what_it_takes() {
+        for (flags, words) in [
+            (&["--spp", "0"][..], ["--spp", "0"]),
+            (&["--resolution", "640"], ["--resolution", "1280x720"]),
+            (&["--pixel-bounds", "0,0,0,1"], ["--pixel-bounds", "X0 < X1"]),
+            (&["--sample-range", "4:4"], ["4:4", "no sample"]),
+            (&["--time-limit", "soon"], ["--time-limit", "10m"]),
+            (&["--aov", "albedo,beauty"], ["beauty", "sampleCount"]),
+            (&["--progress", "loud"], ["loud", "openjd"]),
+            (&["--threads", "many"], ["--threads", "many"]),
+            (&["--crop", "0,1,0,1", "--pixel-bounds", "0,1,0,1"], ["--crop", "--pixel-bounds"]),
+            (&["-v", "-q"], ["--verbose", "--quiet"]),
+        ] {
+            let line = ["tessera", "render", "a.pbrt", "-o", "a.exr"].iter().chain(flags);
+            let error = Arguments::try_parse_from(line).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(words.iter().all(|word| message.contains(word)), "{flags:?}: {message}");
+        }
+    }
+
+    #[test]
     fn a_flag_of_every_command_may_stand_anywhere() {
         for line in [["tessera", "-v", "info", "a.pbrt"], ["tessera", "info", "a.pbrt", "-v"]] {
             assert!(Arguments::try_parse_from(line).unwrap().log.verbose);

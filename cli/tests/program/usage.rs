@@ -23,22 +23,8 @@ fn a_wrong_command_line_exits_with_2_and_says_why() {
     bench.fail(&["bake"], 2, &["bake"]);
     bench.fail(&["render"], 2, &["--output", "<SCENE>"]);
     bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--sppp", "4"], 2, &["--sppp", "--spp"]);
-    for (flag, value, words) in [
-        ("--spp", "0", ["--spp", "0"]),
-        ("--resolution", "640", ["--resolution", "1280x720"]),
-        ("--crop", "0,1,0,2", ["--crop", "X0 < X1 <= 1"]),
-        ("--pixel-bounds", "0,0,0,1", ["--pixel-bounds", "X0 < X1"]),
-        ("--sample-range", "4:4", ["4:4", "no sample"]),
-        ("--time-limit", "soon", ["--time-limit", "10m"]),
-        ("--aov", "albedo,beauty", ["beauty", "sampleCount"]),
-        ("--progress", "loud", ["loud", "openjd"]),
-        ("--threads", "many", ["--threads", "many"]),
-    ] {
-        bench.fail(&["render", "a.pbrt", "-o", "a.exr", flag, value], 2, &words);
-    }
-    bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--crop", "0,1,0,1", "--pixel-bounds", "0,1,0,1"], 2, &["--crop"]);
+    bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--crop", "0,1,0,2"], 2, &["--crop", "X0 < X1 <= 1"]);
     bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--spp", "8", "--sample-range", "0:9"], 2, &["0:9", "--spp"]);
-    bench.fail(&["info", "a.pbrt", "-v", "-q"], 2, &["--verbose"]);
 }
 
 #[test]
