@@ -64,6 +64,20 @@ impl<'w> CoatedDiffuse<'w> {
         Self { base_energy: base.max_element() * coat.mean_transmitted(), coat, albedo, base }
     }
 
+    /// As [`Self::new`], where the bounces between base and coat were summed by wavelength: `response` is the RGB of
+    /// [`Self::response`] over the spectrum of `albedo`.
+    #[inline]
+    pub fn with_response(albedo: Rgb, response: Rgb, coat: Coat<'w>) -> Self {
+        Self { coat, albedo, base: response }
+    }
+
+    /// ρ/η² Σ(ρr)ᵏ, what the base sends back through `coat` of the light that reaches it, for an albedo ρ at one wavelength.
+    pub fn response(coat: &Coat<'_>, albedo: f64) -> f64 {
+        let x = albedo * f64::from(coat.internal());
+        let eta = f64::from(coat.table.eta());
+        albedo * (1..BASE_BOUNCES).fold(1.0, |sum, _| 1.0 + x * sum) / (eta * eta)
+    }
+
     pub(super) fn regularized(self) -> Self {
         Self::new(self.albedo, self.coat.regularized())
     }

@@ -1,11 +1,11 @@
 //! Description → materials.
 
 use crate::bsdf::microfacet::Ggx;
-use crate::bsdf::{CoatTable, MetalTable};
+use crate::bsdf::{Coat, CoatTable, CoatedDiffuse, MetalTable};
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{self, Encoding, MaterialKind, Roughness, Value};
-use crate::spectrum::{ConductorTable, Spectrum};
+use crate::spectrum::{ConductorTable, Spectrum, Uplift};
 use crate::texture::{Textures, load_rgb_encoded};
 
 use super::{Kind, Material, Materials, Metal, Needs, Widths, width};
@@ -94,7 +94,12 @@ impl Builder<'_> {
             MaterialKind::CoatedDiffuse { reflectance, coat } => {
                 let widths = self.widths(&coat.roughness);
                 let reflectance = self.rgb(reflectance);
-                Kind::CoatedDiffuse { reflectance, coat: self.coat(coat, &widths, material.span), widths }
+                let coat = self.coat(coat, &widths, material.span);
+                let response = match (&reflectance, &widths) {
+                    (Value::Constant(albedo), Widths::Constant(ggx)) => Some(self.response(*albedo, *ggx, coat)),
+                    _ => None,
+                };
+                Kind::CoatedDiffuse { reflectance, response, coat, widths }
             }
             MaterialKind::CoatedConductor { conductor, conductor_roughness, coat } => {
                 let (widths, base) = (self.widths(&coat.roughness), self.widths(conductor_roughness));
@@ -166,6 +171,17 @@ impl Builder<'_> {
             self.coat_keys.len() - 1
         });
         index as u32
+    }
+
+    /// RGB of the light that a base of `albedo` sends back through a coat: the bounces between them are not linear in the
+    /// albedo, so they are summed by wavelength.
+    fn response(&self, albedo: Rgb, ggx: Ggx, coat: u32) -> Rgb {
+        let coat = Coat::new(ggx, &self.built.coats[coat as usize]);
+        let albedo = albedo.clamp(Rgb::ZERO, Rgb::ONE);
+        if albedo.max_element() == albedo.min_element() {
+            return Rgb::splat(CoatedDiffuse::response(&coat, f64::from(albedo.x)) as f32);
+        }
+        Uplift::new(albedo).rgb_of(|rho| CoatedDiffuse::response(&coat, rho))
     }
 
     fn metal_table(&mut self, coat: u32, base_alpha: Option<f32>) -> u32 {

@@ -81,14 +81,42 @@ struct Material {
 #[derive(Clone, Debug)]
 enum Kind {
     Interface,
-    Diffuse { reflectance: Value<Rgb> },
-    DiffuseTransmission { reflectance: Value<Rgb>, transmittance: Value<Rgb> },
-    Conductor { metal: Metal, widths: Widths },
-    Dielectric { eta: f32, widths: Widths },
-    ThinDielectric { eta: f32 },
-    CoatedDiffuse { reflectance: Value<Rgb>, widths: Widths, coat: u32 },
-    CoatedConductor { metal: Metal, base: Widths, widths: Widths, coat: u32, table: u32 },
-    Mix { materials: [MaterialId; 2], amount: Value<f32> },
+    Diffuse {
+        reflectance: Value<Rgb>,
+    },
+    DiffuseTransmission {
+        reflectance: Value<Rgb>,
+        transmittance: Value<Rgb>,
+    },
+    Conductor {
+        metal: Metal,
+        widths: Widths,
+    },
+    Dielectric {
+        eta: f32,
+        widths: Widths,
+    },
+    ThinDielectric {
+        eta: f32,
+    },
+    /// `response`: of the base, by wavelength, where nothing about it is textured.
+    CoatedDiffuse {
+        reflectance: Value<Rgb>,
+        response: Option<Rgb>,
+        widths: Widths,
+        coat: u32,
+    },
+    CoatedConductor {
+        metal: Metal,
+        base: Widths,
+        widths: Widths,
+        coat: u32,
+        table: u32,
+    },
+    Mix {
+        materials: [MaterialId; 2],
+        amount: Value<f32>,
+    },
 }
 
 /// A metal. `relative` divides its index by that of the medium above.
@@ -166,9 +194,12 @@ impl Materials {
                 Bsdf::Dielectric(Dielectric { eta: *eta, ggx: widths.at(at, textures) })
             }
             Kind::ThinDielectric { eta } => Bsdf::ThinDielectric(ThinDielectric { eta: *eta }),
-            Kind::CoatedDiffuse { reflectance, widths, coat } => {
+            Kind::CoatedDiffuse { reflectance, response, widths, coat } => {
                 let coat = Coat::new(widths.at(at, textures), &self.coats[*coat as usize]);
-                Bsdf::CoatedDiffuse(CoatedDiffuse::new(albedo(reflectance), coat))
+                Bsdf::CoatedDiffuse(match response {
+                    Some(response) => CoatedDiffuse::with_response(albedo(reflectance), *response, coat),
+                    None => CoatedDiffuse::new(albedo(reflectance), coat),
+                })
             }
             Kind::CoatedConductor { metal, base, widths, coat, table } => {
                 let coat = Coat::new(widths.at(at, textures), &self.coats[*coat as usize]);

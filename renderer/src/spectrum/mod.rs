@@ -14,12 +14,14 @@ mod observer;
 mod observer_data;
 mod rgb_space;
 mod spd;
+mod uplift;
 
 pub use conductor::{ConductorTable, fresnel_conductor};
 pub use illuminant::{blackbody_radiance, daylight};
 pub use named::{named, names};
 pub use rgb_space::RgbSpace;
 pub use spd::{SpectrumError, read_spd};
+pub use uplift::Uplift;
 
 use std::sync::Arc;
 
