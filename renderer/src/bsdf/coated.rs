@@ -60,15 +60,14 @@ impl<'w> CoatedDiffuse<'w> {
         let x = albedo * coat.internal();
         let series = (1..BASE_BOUNCES).fold(Rgb::ONE, |sum, _| Rgb::ONE + x * sum);
         let eta = coat.table.eta();
-        let base = albedo * series / (eta * eta);
-        Self { base_energy: base.max_element() * coat.mean_transmitted(), coat, albedo, base }
+        Self::with_response(albedo, albedo * series / (eta * eta), coat)
     }
 
     /// As [`Self::new`], where the bounces between base and coat were summed by wavelength: `response` is the RGB of
     /// [`Self::response`] over the spectrum of `albedo`.
     #[inline]
     pub fn with_response(albedo: Rgb, response: Rgb, coat: Coat<'w>) -> Self {
-        Self { coat, albedo, base: response }
+        Self { base_energy: response.max_element() * coat.mean_transmitted(), coat, albedo, base: response }
     }
 
     /// ρ/η² Σ(ρr)ᵏ, what the base sends back through `coat` of the light that reaches it, for an albedo ρ at one wavelength.
