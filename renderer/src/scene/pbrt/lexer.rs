@@ -186,6 +186,10 @@ pub(super) fn parse_f64(word: &[u8]) -> Result<f64, NotANumber> {
 
 /// The word as an `i32`.
 pub(super) fn parse_i32(word: &[u8]) -> Result<i32, NotANumber> {
+    // Most integers of a scene are indices: up to nine digits, which cannot overflow.
+    if (1..=9).contains(&word.len()) && word.iter().all(u8::is_ascii_digit) {
+        return Ok(word.iter().fold(0, |value, &digit| 10 * value + i32::from(digit - b'0')));
+    }
     let text = spells_number(word).ok_or(NotANumber::Malformed)?;
     if let Ok(value) = text.parse() {
         return Ok(value);

@@ -1,6 +1,6 @@
 //! Reads pbrt-v4 scene files: the complete grammar, with all that is wrong told at once.
 //!
-//! The way of a scene: [`lexer`] tokens → [`syntax`] directives → [`reader`] state and entities → [`finish`]ed
+//! The way of a scene: `lexer` tokens → `syntax` directives → `reader` state and entities → `finish`ed
 //! description. Each family of entities has its own module, which knows its types, parameters and defaults.
 //!
 //! Paths are relative to the folder of the scene file, as in pbrt, or else to the file that names them.

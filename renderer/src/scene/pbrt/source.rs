@@ -168,25 +168,25 @@ impl<'t, 'r> Cursor<'t, 'r> {
         if open {
             self.advance();
         }
+        let expected = |read: usize| match read {
+            0 => format!("{N} numbers"),
+            _ => format!("{N} numbers, of which {read} came"),
+        };
         let mut numbers = [0.0; N];
         for (index, number) in numbers.iter_mut().enumerate() {
-            let expected = match index {
-                0 => format!("{N} numbers"),
-                _ => format!("{N} numbers, of which {index} came"),
-            };
             match self.peek() {
-                Some(token) if token.kind == Kind::Word => {
-                    let word = shown(&self.content(token));
-                    *number = match parse_f64(self.bytes(token)) {
-                        Ok(value) => value,
-                        Err(NotANumber::TooLarge) => {
-                            return Err(self.fault(self.span(token), format!("the number {word} is too large")));
-                        }
-                        Err(_) => return Err(self.unexpected(Some(token), &expected)),
-                    };
-                    self.advance();
-                }
-                found => return Err(self.unexpected(found, &expected)),
+                Some(token) if token.kind == Kind::Word => match parse_f64(self.bytes(token)) {
+                    Ok(value) => {
+                        *number = value;
+                        self.advance();
+                    }
+                    Err(NotANumber::TooLarge) => {
+                        let word = shown(&self.content(token));
+                        return Err(self.fault(self.span(token), format!("the number {word} is too large")));
+                    }
+                    Err(_) => return Err(self.unexpected(Some(token), &expected(index))),
+                },
+                found => return Err(self.unexpected(found, &expected(index))),
             }
         }
         match self.peek() {
