@@ -329,7 +329,7 @@ fn subsurface(cx: &mut Context, params: &mut Params) -> MaterialKind {
 /// matched boundaries.
 ///
 /// **Source**: van de Hulst's similarity fit, (1 − q)(1 − 0.139 q) / (1 + 1.17 q) with q = √(1 − single-scattering
-/// albedo), \[Hulst80\] section 14.4.
+/// albedo), \[Hulst80\].
 fn semi_infinite_albedo(a: Rgb, s: Rgb) -> Rgb {
     let single = s / (a + s).max(Rgb::splat(f32::MIN_POSITIVE));
     let q = (Rgb::ONE - single).clamp(Rgb::ZERO, Rgb::ONE).map(f32::sqrt);

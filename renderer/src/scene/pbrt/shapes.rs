@@ -227,7 +227,7 @@ fn curve(cx: &mut Context, params: &mut Params) -> Option<ShapeKind> {
 
 /// A segment given by its 3 or 4 points in a basis, as cubic Bézier.
 ///
-/// **Source**: \[Farin01\] sections 5.1 (degree elevation) and 8.2 (knot insertion in uniform B-splines).
+/// **Source**: \[Farin01\], degree elevation and knot insertion in uniform B-splines.
 fn cubic_bezier(points: &[Vec3], basis: Basis) -> [Vec3; 4] {
     let elevated = |[a, b, c]: [Vec3; 3]| [a, a.lerp(b, 2.0 / 3.0), b.lerp(c, 1.0 / 3.0), c];
     match (basis, points) {
