@@ -28,6 +28,7 @@ use crate::scene::description::MaterialId;
 use crate::texture::Textures;
 
 /// Everything that rays can meet.
+#[derive(Debug)]
 pub struct Geometry {
     scene: CommittedScene,
     surfaces: Vec<Surface>,
@@ -38,7 +39,7 @@ pub struct Geometry {
 }
 
 /// A point where a path meets a surface. World space throughout.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct SurfaceInteraction<'g> {
     /// The point.
     pub point: PointWithError,
@@ -123,7 +124,7 @@ impl Geometry {
         let (geometry, instance) = self.locate(hit);
         let surface = &self.surfaces[geometry as usize];
         let length = ray.direction.length();
-        let wo = -ray.direction / length;
+        let wo = ray.direction * -length.recip();
         let local = match &surface.primitives {
             Primitives::Triangles(mesh) => local::triangle(mesh, hit, surface.flipped, self.triangle_test),
             Primitives::Patches(mesh) => local::patch(mesh, hit, surface.flipped),

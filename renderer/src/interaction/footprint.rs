@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use super::SurfaceInteraction;
+use super::{Primitives, SurfaceInteraction};
 use crate::texture::TexturePoint;
 
 impl SurfaceInteraction<'_> {
@@ -25,18 +25,50 @@ impl SurfaceInteraction<'_> {
         let half_axis = radius / (cos.abs() + spread * sin);
         let half_axis = if half_axis.is_finite() { half_axis } else { radius };
         let (dpdx, dpdy) = (2.0 * half_axis * s, 2.0 * radius * self.ng.cross(s));
-        let derivatives = if radius > 0.0 { self.derivatives() } else { None };
-        let (duvdx, duvdy) = derivatives.map_or(Default::default(), |d| (uv_change(d, dpdx), uv_change(d, dpdy)));
+        let (duvdx, duvdy) = if radius > 0.0 { self.uv_changes(dpdx, dpdy) } else { Default::default() };
         TexturePoint { p: self.point.p, n: self.ns, uv: self.uv(), dpdx, dpdy, duvdx, duvdy }
+    }
+
+    /// The changes of (u, v) along two tangents.
+    fn uv_changes(&self, dpdx: Vec3, dpdy: Vec3) -> (Vec2, Vec2) {
+        if let Primitives::Triangles(mesh) = &self.surface.primitives {
+            // Along the edges the change is known, whether or not texture coordinates span the plane.
+            let [p0, p1, p2] = mesh.triangle(self.primitive);
+            let [uv0, uv1, uv2] = mesh.uv(self.primitive);
+            let along = Coordinates::of(self.vector(p1 - p0), self.vector(p2 - p0));
+            let change = |dp| {
+                let c = along.coordinates(dp);
+                c.x * (uv1 - uv0) + c.y * (uv2 - uv0)
+            };
+            return (change(dpdx), change(dpdy));
+        }
+        let along = self.derivatives().map(|(dpdu, dpdv)| Coordinates::of(dpdu, dpdv));
+        along.map_or(Default::default(), |along| (along.coordinates(dpdx), along.coordinates(dpdy)))
     }
 }
 
-/// The change of (u, v) that moves a point by `dp`, in the sense of least squares.
+/// Coordinates of vectors by two others, in the sense of least squares.
 ///
 /// **Source**: \[Pharr23\] section 10.1.1.
-fn uv_change((dpdu, dpdv): (Vec3, Vec3), dp: Vec3) -> Vec2 {
-    let (e, f, g) = (dpdu.length_squared(), dpdu.dot(dpdv), dpdv.length_squared());
-    let (x, y) = (dpdu.dot(dp), dpdv.dot(dp));
-    let change = Vec2::new(g * x - f * y, e * y - f * x) / (e * g - f * f);
-    if change.is_finite() { change } else { Vec2::ZERO }
+struct Coordinates {
+    a: Vec3,
+    b: Vec3,
+    /// Rows of the inverse of their Gram matrix, which is symmetric; zero if they are parallel.
+    inverse: [Vec2; 2],
+}
+
+impl Coordinates {
+    #[inline]
+    fn of(a: Vec3, b: Vec3) -> Self {
+        let (aa, ab, bb) = (a.length_squared(), a.dot(b), b.length_squared());
+        let determinant = aa * bb - ab * ab;
+        let scale = if determinant > 0.0 && determinant.is_finite() { determinant.recip() } else { 0.0 };
+        Self { a, b, inverse: [Vec2::new(bb, -ab) * scale, Vec2::new(-ab, aa) * scale] }
+    }
+
+    #[inline]
+    fn coordinates(&self, v: Vec3) -> Vec2 {
+        let products = Vec2::new(self.a.dot(v), self.b.dot(v));
+        Vec2::new(self.inverse[0].dot(products), self.inverse[1].dot(products))
+    }
 }

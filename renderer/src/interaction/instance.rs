@@ -1,9 +1,9 @@
 //! Placed copies of objects.
 
-use glam::{Affine3A, DMat3, Mat3, Vec3};
+use glam::{Affine3A, DMat3, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::local::{Local, Placed};
-use crate::math::{PointWithError, gamma};
+use crate::math::gamma;
 
 /// A placed copy of an object: its transform, and how the ray query rounds when it takes rays into object space.
 #[derive(Clone, Debug)]
@@ -12,8 +12,8 @@ pub struct Instance {
     pub first_surface: u32,
     /// The transform, as the ray query has it.
     world_from_object: Affine3A,
-    /// Linear part of the inverse, rounded from f64.
-    object_from_world: Mat3,
+    /// Takes normals to world space: the transposed inverse of the linear part, rounded from f64.
+    normal_matrix: Mat3A,
     /// Bound of the error of each element of the inverse that the ray query computes in f32.
     inverse_error: f32,
 }
@@ -27,7 +27,7 @@ impl Instance {
         sound.then(|| Self {
             first_surface,
             world_from_object,
-            object_from_world: inverse.as_mat3(),
+            normal_matrix: Mat3A::from(inverse.transpose().as_mat3()),
             inverse_error: inverse_error(m, inverse) as f32,
         })
     }
@@ -51,9 +51,7 @@ impl Instance {
     /// A normal, object to world, not normalised.
     #[inline]
     pub fn normal(&self, n: Vec3) -> Vec3 {
-        // The product with the transposed inverse, whose rows are the columns of the inverse.
-        let m = &self.object_from_world;
-        Vec3::new(m.x_axis.dot(n), m.y_axis.dot(n), m.z_axis.dot(n))
+        (self.normal_matrix * Vec3A::from(n)).into()
     }
 
     /// The hit in world space, with an error bound that keeps spawned rays clear of the surface.
@@ -69,31 +67,29 @@ impl Instance {
     /// [`super::rounding`]: the same bounds for a vector as long as the primitive's extent in the world are to spare.
     #[inline]
     pub(super) fn apply(&self, local: &Local) -> Placed {
-        let m = Mat3::from(self.world_from_object.matrix3);
-        let translation = Vec3::from(self.world_from_object.translation);
-        let relative = m * local.point.p;
+        let (m, translation) = (&self.world_from_object.matrix3, self.world_from_object.translation);
+        let relative = *m * local.p;
         let p = relative + translation;
-        let (mx, my, mz) = (m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs());
-        let apply_abs = |v: Vec3| mx * v.x + my * v.y + mz * v.z;
-        let rounding = gamma(4) * (apply_abs(local.point.p.abs()) + translation.abs());
+        let m = abs(m);
+        let rounding = gamma(4) * (m * local.p.abs() + translation.abs());
 
-        let n = self.normal(local.ng);
-        let stretch = n.length();
-        let ng = n / stretch;
-        let (n_local, inverse) = (local.ng.abs(), &self.object_from_world);
-        // |n|ᵀ|M⁻¹|, column by column.
-        let seen = Vec3::new(
-            n_local.dot(inverse.x_axis.abs()),
-            n_local.dot(inverse.y_axis.abs()),
-            n_local.dot(inverse.z_axis.abs()),
-        );
-        let extent = Vec3::splat(apply_abs(local.extent).element_sum());
-        let of_inverse = self.inverse_error * n_local.element_sum() * (relative.abs() + extent).element_sum();
+        let n = self.normal_matrix * local.ng;
+        let inverse_stretch = n.length_recip();
+        let ng = n * inverse_stretch;
+        // |n|ᵀ|M⁻¹|
+        let seen = abs(&self.normal_matrix) * local.ng.abs();
+        let extent = Vec3A::splat((m * local.extent).element_sum());
+        let of_inverse = self.inverse_error * local.ng.abs().element_sum() * (relative.abs() + extent).element_sum();
         let origin_error = of_inverse + gamma(7) * seen.dot(p.abs() + translation.abs() + extent);
-        let clearance = (local.clearance + origin_error) / stretch;
-        let error = apply_abs(local.point.error) + rounding + ng.abs() * clearance;
-        Placed::new(PointWithError { p, error }, ng, local.ns.map(|ns| self.normal(ns)))
+        let clearance = (local.clearance + origin_error) * inverse_stretch;
+        let error = m * local.error + rounding + ng.abs() * clearance;
+        Placed::new(p, error, ng, local.ns.map(|ns| self.normal_matrix * ns))
     }
+}
+
+#[inline]
+fn abs(m: &Mat3A) -> Mat3A {
+    Mat3A::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
 }
 
 /// Bound of the error of an element of M⁻¹ when computed in f32 as adjoint over determinant.

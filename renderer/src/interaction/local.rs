@@ -1,7 +1,7 @@
 //! Hits in the space of the surface that was hit: that of the object if it is instanced, else the world's.
 
 use embree::Hit;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec3A};
 
 use super::surface::{CurveSet, Mesh, PatchMesh};
 use super::{Instance, TriangleTest};
@@ -9,17 +9,19 @@ use crate::math::{PointWithError, Ray, gamma};
 use crate::scene::description::CurveKind;
 use crate::shape::{Shape, SurfacePoint, patch};
 
-/// A hit with what an instance has to transform.
+/// A hit with what an instance has to transform. Vectors are aligned, so that arithmetic on them is one instruction.
 pub(super) struct Local {
-    pub point: PointWithError,
+    pub p: Vec3A,
+    /// Bound of the error of `p`, by coordinate.
+    pub error: Vec3A,
     /// Distance along the normal that a spawned ray has to keep beyond the point's error.
     pub clearance: f32,
     /// How far the primitive reaches from the point, by coordinate.
-    pub extent: Vec3,
+    pub extent: Vec3A,
     /// Unit; the side does not matter if `ns` decides.
-    pub ng: Vec3,
+    pub ng: Vec3A,
     /// The interpolated normal, of any length; `None`: that of the surface.
-    pub ns: Option<Vec3>,
+    pub ns: Option<Vec3A>,
 }
 
 /// A hit in world space.
@@ -30,57 +32,71 @@ pub(super) struct Placed {
 }
 
 impl Local {
+    /// Of a shape that is intersected in f64, so that rays need no more than the rounding of the point to clear it.
+    fn of_shape(point: PointWithError, extent: Vec3, ng: Vec3, ns: Option<Vec3>) -> Self {
+        Self {
+            p: point.p.into(),
+            error: point.error.into(),
+            clearance: 0.0,
+            extent: extent.into(),
+            ng: ng.into(),
+            ns: ns.map(Vec3A::from),
+        }
+    }
+
     /// Of a surface that is not instanced.
     #[inline]
     pub fn in_world(self) -> Placed {
-        let error = self.point.error + self.ng.abs() * self.clearance;
-        Placed::new(PointWithError { p: self.point.p, error }, self.ng, self.ns)
+        Placed::new(self.p, self.error + self.ng.abs() * self.clearance, self.ng, self.ns)
     }
 }
 
 impl Placed {
     /// `ng` unit; `ns` of any length.
     #[inline]
-    pub fn new(point: PointWithError, ng: Vec3, ns: Option<Vec3>) -> Self {
-        match ns.and_then(unit) {
-            Some(ns) => Self { point, ng: if ng.dot(ns) < 0.0 { -ng } else { ng }, ns },
-            None => Self { point, ng, ns: ng },
-        }
+    pub fn new(p: Vec3A, error: Vec3A, ng: Vec3A, ns: Option<Vec3A>) -> Self {
+        let (ng, ns) = match ns.and_then(unit) {
+            Some(ns) => (if ng.dot(ns) < 0.0 { -ng } else { ng }, ns),
+            None => (ng, ng),
+        };
+        Self { point: PointWithError { p: p.into(), error: error.into() }, ng: ng.into(), ns: ns.into() }
     }
 }
 
 /// `v` normalised, also where its squared length would leave the range of `f32`; `None` for zero and non-finite.
 #[inline]
-pub(super) fn unit(v: Vec3) -> Option<Vec3> {
+pub(super) fn unit(v: Vec3A) -> Option<Vec3A> {
     let squared = v.length_squared();
-    if (f32::MIN_POSITIVE..=f32::MAX).contains(&squared) {
-        return Some(v / squared.sqrt());
-    }
-    let scaled = v.as_dvec3();
-    let length = scaled.length();
-    (length > 0.0 && length.is_finite()).then(|| (scaled / length).as_vec3())
+    if (f32::MIN_POSITIVE..=f32::MAX).contains(&squared) { Some(v * squared.sqrt().recip()) } else { extreme_unit(v) }
+}
+
+#[cold]
+fn extreme_unit(v: Vec3A) -> Option<Vec3A> {
+    let v = v.as_dvec3();
+    let length = v.length();
+    (length > 0.0 && length.is_finite()).then(|| (v / length).as_vec3a())
 }
 
 #[inline]
 pub(super) fn triangle(mesh: &Mesh, hit: &Hit, flipped: bool, test: TriangleTest) -> Local {
     let indices = mesh.indices[hit.primitive as usize];
-    let v = indices.map(|index| Vec3::from_array(mesh.vertices[index as usize]));
-    let b = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-    let terms = [b.x * v[0], b.y * v[1], b.z * v[2]];
+    let v = indices.map(|index| Vec3A::from_array(mesh.vertices[index as usize]));
+    let b = [1.0 - hit.u - hit.v, hit.u, hit.v];
+    let terms = [b[0] * v[0], b[1] * v[1], b[2] * v[2]];
     let p = terms[0] + terms[1] + terms[2];
     // Barycentric coordinates, products and sums of rounded operations.
     let error = gamma(7) * (terms[0].abs() + terms[1].abs() + terms[2].abs());
     // A triangle that was hit has a normal: zero divides by zero and misses.
-    let n = unit(hit.ng).unwrap_or(Vec3::Z);
+    let n = unit(hit.ng.into()).unwrap_or(Vec3A::Z);
     let to = v.map(|vertex| vertex - p);
     let extent = to[0].abs().max(to[1].abs()).max(to[2].abs());
     let clearance = test.clearance(&to, extent, n, error);
     let ns = (!mesh.normals.is_empty()).then(|| {
-        let [n0, n1, n2] = indices.map(|index| mesh.normals[index as usize]);
-        b.x * n0 + b.y * n1 + b.z * n2
+        let [n0, n1, n2] = indices.map(|index| Vec3A::from(mesh.normals[index as usize]));
+        b[0] * n0 + b[1] * n1 + b[2] * n2
     });
     let ng = if flipped { -n } else { n };
-    Local { point: PointWithError { p, error }, clearance, extent, ng, ns }
+    Local { p, error, clearance, extent, ng, ns }
 }
 
 pub(super) fn patch(mesh: &PatchMesh, hit: &Hit, flipped: bool) -> Local {
@@ -88,15 +104,14 @@ pub(super) fn patch(mesh: &PatchMesh, hit: &Hit, flipped: bool) -> Local {
     let SurfacePoint { point, n, .. } = patch::surface_point(&corners, hit.u, hit.v);
     let (low, high) = patch::bounds(&corners);
     let ns = (!mesh.normals.is_empty()).then(|| mesh.interpolate(hit.primitive, &mesh.normals, hit.u, hit.v));
-    let n = if n == Vec3::ZERO { unit(hit.ng).unwrap_or(Vec3::Z) } else { n };
-    // The patch is intersected in f64, so rays need no more than the rounding of p to clear it.
-    Local { point, clearance: 0.0, extent: high - low, ng: if flipped { -n } else { n }, ns }
+    let n = if n == Vec3::ZERO { unit3(hit.ng).unwrap_or(Vec3::Z) } else { n };
+    Local::of_shape(point, high - low, if flipped { -n } else { n }, ns)
 }
 
 pub(super) fn quadric(shape: &Shape, hit: &Hit) -> Local {
     let surface = quadric_point(shape, hit.ng);
     let (low, high) = shape.bounds();
-    Local { point: surface.point, clearance: 0.0, extent: high - low, ng: surface.n, ns: None }
+    Local::of_shape(surface.point, high - low, surface.n, None)
 }
 
 pub(super) fn quadric_derivatives(shape: &Shape, local: Vec3) -> Option<(Vec3, Vec3)> {
@@ -127,26 +142,30 @@ pub(super) fn curve(curves: &CurveSet, ray: &Ray, hit: &Hit, instance: Option<&I
     let ng = match curves.kind {
         CurveKind::Ribbon => {
             let n = instance.map_or(hit.ng, |instance| instance.normal(hit.ng));
-            unit(n).unwrap_or(Vec3::Z)
+            unit3(n).unwrap_or(Vec3::Z)
         }
         CurveKind::Flat => facing(tangent, ray.direction),
         CurveKind::Cylinder => {
             let flat = facing(tangent, ray.direction);
-            let side = unit(tangent.cross(flat)).unwrap_or(Vec3::ZERO);
+            let side = unit3(tangent.cross(flat)).unwrap_or(Vec3::ZERO);
             let centre = curves.segments.at(segment, hit.u);
             let origin = instance.map_or(centre.truncate(), |instance| instance.point(centre.truncate()));
             // From −1 at one edge to 1 at the other.
             let across = (p - origin).dot(side) / world(Vec3::splat(centre.w / 3.0_f32.sqrt())).length();
             let (sin, cos) = (across.clamp(-1.0, 1.0) * std::f32::consts::FRAC_PI_2).sin_cos();
-            unit(flat * cos + side * sin).unwrap_or(flat)
+            unit3(flat * cos + side * sin).unwrap_or(flat)
         }
     };
-    Local { point: PointWithError { p, error }, clearance: 0.0, extent: Vec3::ZERO, ng, ns: None }
+    Local::of_shape(PointWithError { p, error }, Vec3::ZERO, ng, None)
+}
+
+fn unit3(v: Vec3) -> Option<Vec3> {
+    unit(v.into()).map(Vec3::from)
 }
 
 /// The unit vector orthogonal to `tangent` that points back along `direction` as well as can be.
 fn facing(tangent: Vec3, direction: Vec3) -> Vec3 {
-    unit(tangent.cross(direction).cross(tangent)).map_or_else(|| unit(-direction).unwrap_or(Vec3::Z), |n| -n)
+    unit3(tangent.cross(direction).cross(tangent)).map_or_else(|| unit3(-direction).unwrap_or(Vec3::Z), |n| -n)
 }
 
 /// Linear interpolation over (u, v) of the values at p00, p10, p01, p11.

@@ -31,7 +31,7 @@
 //! normals differ by, γ₄ or τ. Such a ray comes down at a distance of the spare clearance over that angle. So with the angle
 //! times the triangle's extent to spare it comes down outside the triangle.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use crate::math::gamma;
 
@@ -49,7 +49,7 @@ impl TriangleTest {
     /// Distance along the unit normal `n` of the query that clears the tested plane of a triangle from its point `p`, known
     /// to ± `error`. `to` leads from p to the vertices; `extent` holds their largest coordinates.
     #[inline]
-    pub(super) fn clearance(self, to: &[Vec3; 3], extent: Vec3, n: Vec3, error: Vec3) -> f32 {
+    pub(super) fn clearance(self, to: &[Vec3A; 3], extent: Vec3A, n: Vec3A, error: Vec3A) -> f32 {
         let products = n.abs().dot(to[0].abs());
         let tangential = gamma(4) * extent.element_sum();
         match self {
@@ -61,10 +61,10 @@ impl TriangleTest {
 
 /// What the watertight test needs beyond the rounding of its last dot product.
 #[inline]
-fn watertight(to: &[Vec3; 3], extent: Vec3, n: Vec3, error: Vec3) -> f32 {
+fn watertight(to: &[Vec3A; 3], extent: Vec3A, n: Vec3A, error: Vec3A) -> f32 {
     let (e0, e1, e2) = (to[2] - to[0], to[0] - to[1], to[1] - to[2]);
     // The products that are compared: z·y, x·z, y·x of neighbouring edges.
-    let products = |a: Vec3, b: Vec3| Vec3::new(a.z * b.y, a.x * b.z, a.y * b.x).abs();
+    let products = |a: Vec3A, b: Vec3A| Vec3A::new(a.z * b.y, a.x * b.z, a.y * b.x).abs();
     let chosen = products(e0, e1).min(products(e1, e2));
     let doubled_area = e0.cross(e1).length().max(f32::MIN_POSITIVE);
     let tilt = gamma(4) * (n.abs() + 2.0 * chosen / doubled_area);

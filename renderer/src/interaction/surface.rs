@@ -170,7 +170,8 @@ impl Mesh {
         if determinant.abs() <= gamma(4) * (a.abs() + b.abs()) {
             return None;
         }
-        let (dpdu, dpdv) = ((e1 * d2.y - e2 * d1.y) / determinant, (e2 * d1.x - e1 * d2.x) / determinant);
+        let scale = determinant.recip();
+        let (dpdu, dpdv) = ((e1 * d2.y - e2 * d1.y) * scale, (e2 * d1.x - e1 * d2.x) * scale);
         (dpdu.is_finite() && dpdv.is_finite()).then_some((dpdu, dpdv))
     }
 }
