@@ -37,6 +37,7 @@ impl CoatTable {
     /// A coat with relative index `eta` whose width is `alpha`, or textured if that is `None`. `thickness` in mean free
     /// paths.
     pub fn new(eta: f32, thickness: f32, alpha: Option<f32>) -> Self {
+        let thickness = thickness.max(0.0);
         // Without a step of the index the interface does nothing, however rough.
         let alpha = if eta == 1.0 { Some(0.0) } else { alpha };
         let axis = alpha.map_or_else(|| Axis::textured(&Self::NODES), Axis::constant);

@@ -1,12 +1,15 @@
 //! Description → materials.
 
+use std::path::{Path, PathBuf};
+
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::{Coat, CoatTable, CoatedDiffuse, MetalTable};
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{self, Encoding, MaterialKind, Roughness, Value};
 use crate::spectrum::{ConductorTable, Spectrum, Uplift};
-use crate::texture::{Textures, load_rgb_encoded};
+use crate::texture::image::Channels;
+use crate::texture::{Pyramid, Textures};
 
 use super::{Kind, Material, Materials, Metal, Needs, Widths, width};
 
@@ -26,6 +29,8 @@ impl Materials {
         let mut builder = Builder {
             textures,
             built: Materials { list, curves, coats, metals, normal_maps },
+            curve_keys: Vec::new(),
+            normal_map_keys: Vec::new(),
             coat_keys: Vec::new(),
             metal_keys: Vec::new(),
             warnings: Vec::new(),
@@ -42,6 +47,10 @@ impl Materials {
 struct Builder<'a> {
     textures: &'a Textures,
     built: Materials,
+    /// Which η, k and index above each curve is for.
+    curve_keys: Vec<(Spectrum, Spectrum, f32)>,
+    /// Which file each normal map is from.
+    normal_map_keys: Vec<PathBuf>,
     /// Which index, thickness and width each coat table is for; a width of `None` is textured.
     coat_keys: Vec<(f32, f32, Option<f32>)>,
     /// Which coat and base width each metal table is for.
@@ -53,13 +62,7 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn material(&mut self, material: &description::Material) -> Material {
         let kind = self.kind(material);
-        let normal_map = material.normal_map.as_ref().and_then(|path| {
-            let image = load_rgb_encoded(path, Some(Encoding::Linear))
-                .map_err(|why| self.errors.push((material.span, format!("the normal map cannot be read: {why}"))))
-                .ok()?;
-            self.built.normal_maps.push(image);
-            Some(self.built.normal_maps.len() as u32 - 1)
-        });
+        let normal_map = material.normal_map.as_deref().and_then(|path| self.normal_map(path, material.span));
         // A displacement that is the same everywhere bends nothing.
         let displacement = material.displacement.and_then(|id| match self.textures.folded_float(&Value::Texture(id)) {
             Value::Texture(id) => Some(id),
@@ -114,6 +117,24 @@ impl Builder<'_> {
         }
     }
 
+    /// Index of an image: each is loaded once.
+    fn normal_map(&mut self, path: &Path, span: Span) -> Option<u32> {
+        if let Some(known) = self.normal_map_keys.iter().position(|known| known == path) {
+            return Some(known as u32);
+        }
+        match Pyramid::load(path, Channels::Rgb, Some(Encoding::Linear)) {
+            Ok(image) => {
+                self.built.normal_maps.push(image);
+                self.normal_map_keys.push(path.to_owned());
+                Some(self.normal_map_keys.len() as u32 - 1)
+            }
+            Err(why) => {
+                self.errors.push((span, format!("the normal map cannot be read: {why}")));
+                None
+            }
+        }
+    }
+
     fn rgb(&self, value: &Value<Rgb>) -> Value<Rgb> {
         self.textures.folded_rgb(value)
     }
@@ -132,8 +153,14 @@ impl Builder<'_> {
     fn metal(&mut self, conductor: &description::Conductor, relative: f32) -> Metal {
         match conductor {
             description::Conductor::EtaK { eta: Value::Constant(eta), k: Value::Constant(k) } => {
-                self.built.curves.push(ConductorTable::new(eta, k, relative));
-                Metal::Curve(self.built.curves.len() as u32 - 1)
+                let known =
+                    self.curve_keys.iter().position(|known| (&known.0, &known.1, known.2) == (eta, k, relative));
+                let index = known.unwrap_or_else(|| {
+                    self.curve_keys.push((eta.clone(), k.clone(), relative));
+                    self.built.curves.push(ConductorTable::new(eta, k, relative));
+                    self.curve_keys.len() - 1
+                });
+                Metal::Curve(index as u32)
             }
             description::Conductor::EtaK { eta, k } => {
                 let rgb = |value: &Value<Spectrum>| match value {

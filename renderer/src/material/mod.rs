@@ -19,7 +19,7 @@ use crate::math::{Frame, Rgb};
 use crate::sampling::mix64;
 use crate::scene::description::{MaterialId, TextureId, Value};
 use crate::spectrum::ConductorTable;
-use crate::texture::{RgbImage, TexturePoint, Textures};
+use crate::texture::{Pyramid, TexturePoint, Textures};
 
 /// All materials of a scene.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Materials {
     curves: Vec<ConductorTable>,
     coats: Vec<CoatTable>,
     metals: Vec<MetalTable>,
-    normal_maps: Vec<RgbImage>,
+    normal_maps: Vec<Pyramid>,
 }
 
 /// What of a hit a material looks at, so that nothing else is computed.
@@ -167,10 +167,11 @@ impl Materials {
     #[inline]
     fn frame(&self, material: &Material, at: &Surface, textures: &Textures) -> Frame {
         let (mut ns, mut dpdu) = (at.ns, at.dpdu);
-        if let Some(displacement) = material.displacement {
-            (ns, dpdu) = perturb::bump(at, displacement, textures);
-        } else if let Some(map) = material.normal_map {
+        // Of both pbrt-v4 looks at the normal map alone.
+        if let Some(map) = material.normal_map {
             ns = perturb::normal_map(at, &self.normal_maps[map as usize]);
+        } else if let Some(displacement) = material.displacement {
+            (ns, dpdu) = perturb::bump(at, displacement, textures);
         }
         if material.anisotropic { Frame::from_normal_and_tangent(ns, dpdu) } else { Frame::from_normal(ns) }
     }

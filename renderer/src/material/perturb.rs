@@ -4,8 +4,8 @@ use glam::{Vec2, Vec3};
 
 use super::Surface;
 use crate::math::{Frame, Rgb};
-use crate::scene::description::{TextureId, Value};
-use crate::texture::{RgbImage, TexturePoint, Textures};
+use crate::scene::description::{TextureId, Value, Wrap};
+use crate::texture::{Pyramid, TexturePoint, Textures};
 
 /// Step in u and v where there is no footprint: small against most features of textures, large against rounding.
 ///
@@ -34,31 +34,26 @@ pub fn bump(at: &Surface, displacement: TextureId, textures: &Textures) -> (Vec3
     let dpdu = tangential(at.dpdu) + at.ns * ((beside_u - here) / du);
     let dpdv = tangential(at.dpdv) + at.ns * ((beside_v - here) / dv);
     match dpdu.cross(dpdv).try_normalize() {
-        Some(ns) => (if ns.dot(at.ng) < 0.0 { -ns } else { ns }, dpdu),
+        Some(ns) => (towards(ns, at.ng), dpdu),
         None => (at.ns, at.dpdu),
     }
 }
 
-/// The normal that a tangent-space normal map gives, bilinearly interpolated, repeated beyond [0, 1].
+/// The normal that a tangent-space normal map gives, on the side of the geometric normal; bilinear, repeated beyond [0, 1].
 ///
 /// **Source**: pbrt-v4, by behaviour: (r, g, b) ↦ 2(r, g, b) − 1 in the frame of the shading normal and ∂p/∂u.
-pub fn normal_map(at: &Surface, map: &RgbImage) -> Vec3 {
+pub fn normal_map(at: &Surface, map: &Pyramid) -> Vec3 {
     let uv = at.texture_point.uv;
-    let texel = bilinear(map, Vec2::new(uv.x, 1.0 - uv.y));
+    let st = Vec2::new(uv.x, 1.0 - uv.y);
+    let bent = 2.0 * map.bilinear(st, Wrap::Repeat) - Rgb::ONE;
     let frame = Frame::from_normal_and_tangent(at.ns, at.dpdu);
-    let bent = 2.0 * texel - Rgb::ONE;
-    (frame.s * bent.x + frame.t * bent.y + frame.n * bent.z).try_normalize().unwrap_or(at.ns)
+    match (frame.s * bent.x + frame.t * bent.y + frame.n * bent.z).try_normalize() {
+        Some(ns) => towards(ns, at.ng),
+        None => at.ns,
+    }
 }
 
-fn bilinear(image: &RgbImage, st: Vec2) -> Rgb {
-    let size = Vec2::new(image.width as f32, image.height as f32);
-    let position = st * size - 0.5;
-    let (low, weight) = (position.floor(), position - position.floor());
-    // The remainder of a float is exact, so a texture coordinate of any size lands in the image.
-    let column = |x: f32| (x.rem_euclid(size.x) as usize).min(image.width - 1);
-    let row = |y: f32| (y.rem_euclid(size.y) as usize).min(image.height - 1);
-    let texel = |dx: f32, dy: f32| image.pixel(column(low.x + dx), row(low.y + dy));
-    let upper = texel(0.0, 0.0).lerp(texel(1.0, 0.0), weight.x);
-    let lower = texel(0.0, 1.0).lerp(texel(1.0, 1.0), weight.x);
-    upper.lerp(lower, weight.y)
+/// `ns` or its opposite, whichever is on the side of `ng`.
+fn towards(ns: Vec3, ng: Vec3) -> Vec3 {
+    if ns.dot(ng) < 0.0 { -ns } else { ns }
 }

@@ -1,6 +1,7 @@
 use super::*;
 use crate::scene::Span;
 use crate::scene::description::{self, MaterialKind, Roughness, Texture, TextureKind};
+use crate::texture::image::{TexelData, Texels};
 
 fn diffuse(reflectance: Value<Rgb>) -> description::Material {
     description::Material {
@@ -100,12 +101,65 @@ fn a_ramp_of_displacement_tilts_the_normal_by_its_slope() {
     }
 }
 
+/// A normal map of one texel.
+fn map(rgb: [f32; 3]) -> Pyramid {
+    let data = TexelData::Float(rgb.to_vec());
+    let encoding = description::Encoding::Linear;
+    Pyramid::new(Texels { width: 1, height: 1, channels: 3, data, encoding, alpha: false, replaced: 0 })
+}
+
 #[test]
-fn a_flat_normal_map_leaves_the_normal() {
-    let map = RgbImage { width: 2, height: 2, pixels: vec![Rgb::new(0.5, 0.5, 1.0); 4] };
+fn a_normal_map_bends_along_the_tangents() {
     let at = Surface {
         texture_point: TexturePoint { uv: Vec2::new(-7.3, 1.0e9), ..TexturePoint::default() },
+        ng: Vec3::Y,
+        ns: Vec3::Y,
+        dpdu: 3.0 * Vec3::Z,
         ..surface(Vec3::ZERO)
     };
-    assert!((perturb::normal_map(&at, &map) - Vec3::Z).length() < 1e-6);
+    assert!((perturb::normal_map(&at, &map([0.5, 0.5, 1.0])) - Vec3::Y).length() < 1e-6);
+    // 0.6 along ∂p/∂u, then along n × ∂p/∂u.
+    assert!((perturb::normal_map(&at, &map([0.8, 0.5, 0.9])) - Vec3::new(0.0, 0.8, 0.6)).length() < 1e-6);
+    assert!((perturb::normal_map(&at, &map([0.5, 0.8, 0.9])) - Vec3::new(0.6, 0.8, 0.0)).length() < 1e-6);
+    // The side of the geometric normal wins.
+    assert!((perturb::normal_map(&Surface { ng: -Vec3::Y, ..at }, &map([0.5, 0.5, 1.0])) + Vec3::Y).length() < 1e-6);
+}
+
+#[test]
+fn coats_metals_and_maps_that_are_alike_are_made_once() {
+    let smooth = || Roughness { u: Value::Constant(0.0), v: Value::Constant(0.0), remap: true };
+    let coat = || description::Coat {
+        roughness: smooth(),
+        thickness: Value::Constant(0.01),
+        eta: 1.5,
+        g: Value::Constant(0.0),
+        albedo: Value::Constant(Rgb::ZERO),
+    };
+    let coated = |albedo: f32| description::Material {
+        kind: MaterialKind::CoatedDiffuse { reflectance: Value::Constant(Rgb::splat(albedo)), coat: coat() },
+        ..diffuse(Value::Constant(Rgb::ZERO))
+    };
+    let spectrum = |name: &str| Value::Constant(crate::spectrum::named(name).unwrap());
+    let metal = || description::Material {
+        kind: MaterialKind::CoatedConductor {
+            conductor: description::Conductor::EtaK { eta: spectrum("metal-Al-eta"), k: spectrum("metal-Al-k") },
+            conductor_roughness: smooth(),
+            coat: coat(),
+        },
+        ..diffuse(Value::Constant(Rgb::ZERO))
+    };
+    let built = build(&[coated(0.2), coated(0.7), metal(), metal()], &Textures::default());
+    assert_eq!((built.coats.len(), built.metals.len(), built.curves.len()), (1, 1, 1));
+    // Al in a medium of index 1.5 under a coat that reflects 4 %: between the metal's 0.87 alone and 1.
+    let shading = built.shade(MaterialId(2), &surface(Vec3::ZERO), &Textures::default()).unwrap();
+    let albedo = albedo(&shading);
+    assert!(albedo.min_element() > 0.85 && albedo.max_element() < 0.93, "{albedo}");
+}
+
+#[test]
+fn a_normal_map_that_is_not_there_is_an_error() {
+    let material = description::Material { normal_map: Some("none.png".into()), ..diffuse(Value::Constant(Rgb::ONE)) };
+    let errors = Materials::build(&[material.clone(), material], &Textures::default()).unwrap_err();
+    assert_eq!(errors.len(), 2);
+    assert!(errors[0].1.contains("none.png"), "{}", errors[0].1);
 }
