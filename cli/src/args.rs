@@ -70,6 +70,9 @@ The same scene, seed and samples give the same file, byte for byte, on any numbe
 the number of samples depend on the machine. The file appears under its name only when it is complete. Its date is that \
 of the environment variable SOURCE_DATE_EPOCH, else 1970; --provenance writes the real one.
 
+SIGINT (Ctrl-C) and SIGTERM end the render after the current pass over the frame: the image is written with the \
+samples so far, its metadata says tessera/complete = 0, and the exit code is 75. A second signal ends the program at once.
+
 Standard output carries lines for machines only (--progress), standard error lines for people.";
 
 /// Options of `render`.

@@ -14,6 +14,8 @@ pub enum Failure {
     Input(String),
     /// An output cannot be written.
     Output(String),
+    /// The program was asked to stop. What there was of the picture is written; trying again makes the whole.
+    Interrupted(String),
     /// All was done, but the result is not good enough.
     Quality(String),
 }
@@ -27,9 +29,13 @@ impl Failure {
             Self::Input(_) => 3,
             Self::Output(_) => 4,
             Self::Quality(_) => 5,
+            Self::Interrupted(_) => INTERRUPTED,
         }
     }
 }
+
+/// The exit code of an interrupted job: EX_TEMPFAIL of sysexits.h, which batch systems can be told to requeue on.
+pub const INTERRUPTED: u8 = 75;
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -37,6 +43,7 @@ impl fmt::Display for Failure {
         | Self::Usage(message)
         | Self::Input(message)
         | Self::Output(message)
+        | Self::Interrupted(message)
         | Self::Quality(message)) = self;
         f.write_str(message)
     }
@@ -56,4 +63,5 @@ Exit codes:
   2   the command line is wrong
   3   the scene, an asset or an input image cannot be read
   4   an output cannot be written
-  5   the result misses a threshold, or samples had to be rejected under --strict";
+  5   the result misses a threshold, or samples had to be rejected under --strict
+  75  SIGINT or SIGTERM stopped the render; the image holds the samples up to then";

@@ -8,6 +8,7 @@ mod args;
 mod commands;
 mod exit;
 mod frame_name;
+mod interrupt;
 mod inventory;
 mod job;
 mod log;

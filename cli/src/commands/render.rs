@@ -12,6 +12,7 @@ use renderer::scene::{Diagnostic, Severity};
 
 use crate::args::RenderArguments;
 use crate::exit::Failure;
+use crate::interrupt::Interrupt;
 use crate::job;
 use crate::log::Log;
 use crate::output::OutputFile;
@@ -36,7 +37,10 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
 
     let job = job(arguments);
     log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
-    let reporter = Reporter { log, progress, warnings: AtomicU64::new(0) };
+    let reporter = Reporter { log, progress, warnings: AtomicU64::new(0), interrupt: Interrupt::default() };
+    if let Err(why) = reporter.interrupt.listen() {
+        log.warning(&format!("signals will end the render without an image: {why}"));
+    }
     let frame = render::render(&job, &reporter).map_err(|error| reporter.failure(error))?;
 
     progress.phase("write");
@@ -50,6 +54,10 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     if let Some(file) = stats_file {
         let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
         file.write((text + "\n").as_bytes())?;
+    }
+    if reporter.interrupt.requested() && !stats.complete {
+        tell(&stats, &frame, log);
+        return Err(Failure::Interrupted("interrupted; the image holds the samples up to now".into()));
     }
     progress.finish(&path, stats.memory.peak_resident_bytes);
     tell(&stats, &frame, log);
@@ -92,6 +100,7 @@ struct Reporter<'a> {
     log: &'a Log,
     progress: &'a Progress<'a>,
     warnings: AtomicU64,
+    interrupt: Interrupt,
 }
 
 impl Observer for Reporter<'_> {
@@ -123,6 +132,10 @@ impl Observer for Reporter<'_> {
 
     fn progress(&self, done: f64) {
         self.progress.advance(done);
+    }
+
+    fn stop_requested(&self) -> bool {
+        self.interrupt.requested()
     }
 }
 

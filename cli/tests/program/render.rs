@@ -163,6 +163,37 @@ fn a_time_limit_ends_a_long_render_early_and_says_so() {
     assert!(matches!(samples, Some(oiio::Attribute::Int(1..100_000_000))), "{samples:?}");
 }
 
+/// Starts a render that would take hours, waits until it traces, and sends it `signal`.
+fn interrupt(bench: &Bench, signal: &str) -> Run {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+    let arguments = ["render", "scene.pbrt", "-o", "a.exr", "--spp", "100000000", "--progress", "alf"];
+    let mut command = bench.command(&arguments);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stdout = BufReader::new(child.stdout.take().unwrap());
+    let mut line = String::new();
+    stdout.read_line(&mut line).unwrap();
+    assert_eq!(line, "ALF_PROGRESS 0%\n");
+    assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
+    stdout.read_to_string(&mut line).unwrap();
+    let output = child.wait_with_output().unwrap();
+    Run { stdout: line, ..Run::of(output) }
+}
+
+#[test]
+fn a_signal_ends_the_render_with_an_image_and_a_code_of_its_own() {
+    for signal in ["TERM", "INT"] {
+        let bench = bench();
+        let run = interrupt(&bench, signal);
+        assert_eq!(run.code, 75, "{}", run.stderr);
+        assert!(run.stderr.contains("stopped early") && run.stderr.contains("interrupted"), "{}", run.stderr);
+        assert!(!run.stdout.contains("100%") && !run.stdout.contains("Finished"), "{}", run.stdout);
+        assert_eq!(bench.files(), ["a.exr", "scene.pbrt"]);
+        let image = read(&bench.path("a.exr"));
+        assert_eq!(image.attribute("tessera/complete"), Some(&oiio::Attribute::Int(0)));
+    }
+}
+
 #[test]
 fn a_wrong_scene_exits_with_3_shows_every_error_and_leaves_the_old_image() {
     let bench = bench();
