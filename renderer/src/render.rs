@@ -129,6 +129,8 @@ pub struct FrameDescription {
     pub scene_hash: u64,
     /// Camera space from world space.
     pub camera_from_world: glam::DMat4,
+    /// Screen space, normalised to [0, 1]², from world space; `None` for a camera without such a space.
+    pub ndc_from_world: Option<glam::DMat4>,
     /// The output that the scene names.
     pub filename: Option<PathBuf>,
 }
@@ -232,7 +234,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     })?;
     warnings.iter().for_each(|warning| observer.warning(warning));
     statistics.compile_seconds = start.elapsed().as_secs_f64();
-    statistics.embree_bytes = device.memory().peak as u64;
+    statistics.embree_bytes = device.memory().peak;
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
     let description = FrameDescription {
@@ -241,6 +243,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         sample_range_asked: asked,
         scene_hash: description.sources.hash(),
         camera_from_world: description.camera.world_from_camera.inverse().matrix(),
+        ndc_from_world: world.camera.ndc_from_world(),
         filename: description.film.filename.clone(),
     };
     Ok(Prepared { world, description, aovs, statistics, device })

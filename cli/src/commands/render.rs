@@ -186,6 +186,10 @@ fn attributes(arguments: &RenderArguments, frame: &Frame) -> Vec<(String, Attrib
         ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
         ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(frame)))),
     ];
+    if let Some(ndc_from_world) = description.ndc_from_world {
+        let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
+        attributes.push(("worldtoNDC".into(), matrix));
+    }
     if arguments.channels.provenance {
         add_provenance(&mut attributes, frame);
     }

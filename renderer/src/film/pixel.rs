@@ -14,7 +14,7 @@ pub struct Pixel {
     pub sum_of_squares: DVec3,
     /// Σ w alpha.
     pub alpha: f64,
-    /// Σ w. Weights are ± one constant, so their sum is exact.
+    /// Σ w. Nearly all weights are ± one constant.
     pub weight: f64,
     /// Number of samples, rejected ones included: a rejected sample counts as black.
     pub count: u64,

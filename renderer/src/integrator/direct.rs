@@ -3,7 +3,6 @@
 use glam::Vec3;
 
 use super::{Counters, Queries};
-use crate::bsdf::Bsdf;
 use crate::interaction::SurfaceInteraction;
 use crate::light::{Receiver, Target, power_heuristic};
 use crate::material::Shading;
@@ -43,30 +42,50 @@ pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> Rgb {
     }
 }
 
+/// A vertex of a path, ready to scatter.
+#[derive(Clone, Copy)]
+pub struct Vertex<'a> {
+    /// The surface there.
+    pub surface: SurfaceInteraction<'a>,
+    /// What it does.
+    pub shading: Shading<'a>,
+    /// Where the path came from, in the frame of `shading`.
+    pub wo: LocalDir,
+}
+
+impl Vertex<'_> {
+    /// The vertex as lights see it. A surface that transmits receives from both sides, which a normal of zero says.
+    pub fn receiver(&self) -> Receiver {
+        let n = match self.wo.cos_theta() {
+            _ if self.shading.bsdf.is_transmissive() => Vec3::ZERO,
+            below if below < 0.0 => -self.shading.frame.n,
+            _ => self.shading.frame.n,
+        };
+        Receiver { p: self.surface.point.p, n }
+    }
+}
+
 /// Radiance that a light sample sends by way of `vertex` along `wo`, weighted against the BSDF sample.
 pub fn estimate<Q: Queries>(
     world: &World,
     queries: &Q,
-    vertex: &SurfaceInteraction<'_>,
-    shading: &Shading<'_>,
-    wo: LocalDir,
+    vertex: &Vertex<'_>,
     numbers: &Numbers,
     bounce: u32,
     counters: &mut Counters,
 ) -> Rgb {
-    let receiver = receiver(vertex, &shading.bsdf, shading.frame.n);
     let u_select = numbers.d1(Dimension::at(bounce, Use::LightSelect));
-    let Some(light) = world.lights.sample(&receiver, u_select, numbers.d2(Dimension::at(bounce, Use::Light))) else {
-        return Rgb::ZERO;
-    };
-    let (f, bsdf_pdf) = shading.bsdf.eval_pdf(wo, shading.frame.to_local(light.wi));
+    let u = numbers.d2(Dimension::at(bounce, Use::Light));
+    let Some(light) = world.lights.sample(&vertex.receiver(), u_select, u) else { return Rgb::ZERO };
+    let (f, bsdf_pdf) = vertex.shading.bsdf.eval_pdf(vertex.wo, vertex.shading.frame.to_local(light.wi));
     if f == Rgb::ZERO {
         return Rgb::ZERO;
     }
+    let (point, ng) = (vertex.surface.point, vertex.surface.ng);
     let segment = match light.target {
-        Target::Surface { point, n } => spawn_segment(vertex.point, vertex.ng, point, n),
-        Target::Point(p) => spawn_segment(vertex.point, vertex.ng, PointWithError::exact(p), Vec3::ZERO),
-        Target::Infinite => spawn_ray(vertex.point, vertex.ng, light.wi),
+        Target::Surface { point: target, n } => spawn_segment(point, ng, target, n),
+        Target::Point(p) => spawn_segment(point, ng, PointWithError::exact(p), Vec3::ZERO),
+        Target::Infinite => spawn_ray(point, ng, light.wi),
     };
     counters.shadow_rays += 1;
     if queries.occluded(&segment) {
@@ -78,10 +97,4 @@ pub fn estimate<Q: Queries>(
         _ => 1.0,
     };
     f * light.radiance * (weight / light.pdf)
-}
-
-/// The vertex as lights see it. A surface that transmits receives from both sides, which a normal of zero says.
-pub fn receiver(vertex: &SurfaceInteraction<'_>, bsdf: &Bsdf<'_>, ns: Vec3) -> Receiver {
-    let n = if bsdf.is_transmissive() { Vec3::ZERO } else { ns };
-    Receiver { p: vertex.point.p, n: if n.dot(vertex.wo) < 0.0 { -n } else { n } }
 }

@@ -2,12 +2,10 @@
 
 use glam::Vec3;
 
-use super::direct::{self, Scatter};
+use super::direct::{self, Scatter, Vertex};
 use super::{Counters, FirstHit, Queries, Sample, roulette};
 use crate::bsdf::BsdfSample;
 use crate::camera::CameraRay;
-use crate::interaction::SurfaceInteraction;
-use crate::material::Shading;
 use crate::math::{Ray, Rgb, spawn_ray};
 use crate::sampling::{Dimension, Numbers, Use};
 use crate::world::World;
@@ -37,37 +35,35 @@ pub fn trace<Q: Queries>(
             path.radiance += path.beta * direct::escaped(world, path.ray.direction, path.last.as_ref());
             break;
         };
-        let vertex = world.geometry.interaction(&path.ray, &hit);
-        path.cone_radius += path.cone_spread * vertex.t;
-        path.radiance += path.beta * direct::emitted(world, &vertex, path.last.as_ref());
+        let surface = world.geometry.interaction(&path.ray, &hit);
+        path.cone_radius += path.cone_spread * surface.t;
+        path.radiance += path.beta * direct::emitted(world, &surface, path.last.as_ref());
         if path.bounce == world.integrator.max_depth {
             break;
         }
 
-        // The surface there; an interface between media is none.
-        let Some(mut shading) = world.shade(&vertex, path.cone_radius) else {
-            path.ray = spawn_ray(vertex.point, vertex.ng, path.ray.direction);
+        // What is there; an interface between media is nothing.
+        let Some(mut shading) = world.shade(&surface, path.cone_radius) else {
+            path.ray = spawn_ray(surface.point, surface.ng, path.ray.direction);
             continue;
         };
         if world.integrator.regularize && path.roughened {
             shading.bsdf = shading.bsdf.regularized();
         }
-        let wo = shading.frame.to_local(vertex.wo);
-        if first_hit && path.bounce == 0 {
-            let albedo = shading.bsdf.albedo(wo);
-            sample.first = FirstHit { albedo, ns: shading.frame.n, ng: vertex.ng, p: vertex.point.p, depth: vertex.t };
+        let vertex = Vertex { wo: shading.frame.to_local(surface.wo), surface, shading };
+        if path.bounce == 0 {
+            sample.alpha = 1.0;
+            sample.first = if first_hit { vertex.first_hit() } else { FirstHit::default() };
         }
-        sample.alpha = 1.0;
 
         // Light that a light sample brings, and the direction in which the path goes on.
-        if !shading.bsdf.is_specular() {
-            path.radiance +=
-                path.beta * direct::estimate(world, queries, &vertex, &shading, wo, numbers, path.bounce, counters);
+        if !vertex.shading.bsdf.is_specular() {
+            path.radiance += path.beta * direct::estimate(world, queries, &vertex, numbers, path.bounce, counters);
         }
         let u_lobe = numbers.d1(Dimension::at(path.bounce, Use::Lobe));
         let u = numbers.d2(Dimension::at(path.bounce, Use::Bsdf));
-        let Some(next) = shading.bsdf.sample(wo, u_lobe, u) else { break };
-        path.scatter(&vertex, &shading, &next);
+        let Some(next) = vertex.shading.bsdf.sample(vertex.wo, u_lobe, u) else { break };
+        path.scatter(&vertex, &next);
         counters.scatterings += 1;
 
         let u = numbers.d1(Dimension::at(path.bounce, Use::Roulette));
@@ -121,23 +117,35 @@ impl Path {
     }
 
     /// Goes on from `vertex` in the direction of `next`.
-    fn scatter(&mut self, vertex: &SurfaceInteraction<'_>, shading: &Shading<'_>, next: &BsdfSample) {
-        let wi: Vec3 = shading.frame.to_world(next.wi);
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+        let wi: Vec3 = vertex.shading.frame.to_world(next.wi);
         self.beta *= next.weight;
-        self.ray = spawn_ray(vertex.point, vertex.ng, wi);
+        self.ray = spawn_ray(vertex.surface.point, vertex.surface.ng, wi);
         self.bounce += 1;
         if next.transmission {
             self.eta_scale *= next.eta * next.eta;
         }
         if next.specular {
             self.last = None;
-        } else {
-            let receiver = direct::receiver(vertex, &shading.bsdf, shading.frame.n);
-            self.last = Some(Scatter { receiver, pdf: next.pdf });
-            self.roughened = true;
-            // A cone of solid angle Ω has the spread √(Ω/π) for small Ω; capped at that of a quarter sphere.
-            let spread = (LOBE_SHARE / (std::f32::consts::PI * next.pdf)).sqrt().min(1.0);
-            self.cone_spread = self.cone_spread.max(spread);
+            return;
+        }
+        self.last = Some(Scatter { receiver: vertex.receiver(), pdf: next.pdf });
+        self.roughened = true;
+        // A cone of solid angle Ω has the spread √(Ω/π) for small Ω; capped at that of half a right angle.
+        let spread = (LOBE_SHARE / (std::f32::consts::PI * next.pdf)).sqrt().min(1.0);
+        self.cone_spread = self.cone_spread.max(spread);
+    }
+}
+
+impl Vertex<'_> {
+    /// What auxiliary outputs show of the vertex.
+    fn first_hit(&self) -> FirstHit {
+        FirstHit {
+            albedo: self.shading.bsdf.albedo(self.wo),
+            ns: self.shading.frame.n,
+            ng: self.surface.ng,
+            p: self.surface.point.p,
+            depth: self.surface.t,
         }
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::PointWithError;
-use super::interval::{next_away_from_zero, next_towards_zero};
+use super::interval::{gamma, next_away_from_zero, next_towards_zero};
 
 /// A half line or segment in world space. `direction` need not be unit; hit distances are in its units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,12 +40,17 @@ pub fn spawn_ray(from: PointWithError, ng: Vec3, direction: Vec3) -> Ray {
 
 /// The open segment between two surface points, for a visibility query: `direction` spans it, `t_max` is just below 1.
 ///
-/// A normal of zero marks a point that lies on no surface.
+/// A normal of zero marks a point that lies on no surface. What the query computes for the distance of the target's own
+/// plane is wrong by rounding in proportion to the length of the segment: with T = n·(v − o) off by γ₄ Σ|nᵢdᵢ| and n·d by
+/// γ₃ Σ|nᵢdᵢ|, their quotient by γ₈ Σ|nᵢdᵢ| / |n·d|. The segment ends that much earlier, so a light is not in its own shadow.
 pub fn spawn_segment(from: PointWithError, ng_from: Vec3, to: PointWithError, ng_to: Vec3) -> Ray {
     let origin = offset_origin(from, ng_from, to.p - from.p);
     let target = offset_origin(to, ng_to, origin - to.p);
-    // Both ends are outside their surfaces; one ulp below 1 keeps the end itself open.
-    Ray { origin, direction: target - origin, t_max: next_towards_zero(1.0) }
+    let direction = target - origin;
+    let cosine = ng_to.dot(direction).abs();
+    let slack = if cosine > 0.0 { gamma(8) * ng_to.abs().dot(direction.abs()) / cosine } else { 0.0 };
+    // One ulp below 1 keeps the end itself open. A target seen edge on has no length left, and no cosine to light with.
+    Ray { origin, direction, t_max: next_towards_zero((1.0 - slack).max(0.0)) }
 }
 
 fn offset_origin(from: PointWithError, ng: Vec3, direction: Vec3) -> Vec3 {

@@ -1,6 +1,6 @@
 //! Affine transforms between spaces.
 
-use glam::{DMat4, DVec3, DVec4, Mat4, Vec3};
+use glam::{DMat4, DVec4, Mat4, Vec3};
 
 /// An affine or projective map with its inverse. Products are formed in `f64`, so that a long chain of file directives
 /// rounds only once.
@@ -59,7 +59,7 @@ impl Transform {
 
     /// Applies to a normal: by the transpose of the inverse, not normalised.
     pub fn normal(&self, n: Vec3) -> Vec3 {
-        let v: DVec4 = self.inverse.transpose() * DVec3::from(n.as_dvec3()).extend(0.0);
+        let v: DVec4 = self.inverse.transpose() * n.as_dvec3().extend(0.0);
         v.truncate().as_vec3()
     }
 
@@ -81,6 +81,7 @@ impl std::ops::Mul for Transform {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn products_apply_right_to_left_and_invert() {
