@@ -64,7 +64,7 @@ impl LightBounds {
     /// The area is that of the sphere because the importance sees no more of the box than its sphere; unlike the box, the
     /// sphere also has an area where point lights stand in a row.
     ///
-    /// **Source**: \[Conty18\] equations 1 and 2.
+    /// **Source**: \[Conty18\], surface area orientation heuristic.
     pub fn cost(&self) -> f64 {
         let o = self.theta_o;
         let w = (o + self.theta_e).min(PI);

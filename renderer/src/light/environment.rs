@@ -78,7 +78,7 @@ impl Environment {
     /// Samples only what exceeds the mean, by how much it does. With BSDF samples beside, which find the rest, the
     /// weighted sum of both stays complete and has less variance.
     ///
-    /// **Source**: \[Karlik19\] section 4.1.
+    /// **Source**: \[Karlik19\].
     pub fn compensate(&mut self) {
         let texels = self.texels.as_flattened().as_flattened();
         let sum: f64 = texels.iter().map(|t| f64::from(t.element_sum())).sum();

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 ///
 /// Equal areas of the square are equal solid angles: the density on the sphere is that on the square over 4π.
 ///
-/// **Source**: \[Clarberg08\] section 3.
+/// **Source**: \[Clarberg08\].
 #[inline]
 pub fn direction_from_square(uv: Vec2) -> Vec3 {
     let p = 2.0 * uv - Vec2::ONE;

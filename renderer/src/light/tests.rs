@@ -100,7 +100,7 @@ fn sampled_irradiance(lights: &Lights, from: &Receiver, samples: u32) -> Mean {
 /// Irradiance of a polygon of radiance 1: half the sum over edges of the angle each subtends times the cosine between the
 /// normal and the plane through the edge and the receiver.
 ///
-/// **Source**: \[Arvo94\] equation 3.3 (Lambert's formula). The polygon is above the receiver's horizon, clockwise as the
+/// **Source**: \[Arvo95b\] equations 3.1 to 3.3 (Lambert's formula). The polygon is above the receiver's horizon, clockwise as the
 /// receiver sees it.
 fn lambert(corners: &[DVec3], p: DVec3, n: DVec3) -> f64 {
     let edge = |i: usize| {

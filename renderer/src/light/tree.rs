@@ -150,7 +150,7 @@ impl Node {
 
     /// What each group may send to the receiver, up to a common factor: at least 0, and above 0 where anything arrives.
     ///
-    /// **Source**: \[Conty18\] section 3.2 for intensity·cosθ′/d². The box counts as its bounding sphere, and everything is
+    /// **Source**: \[Conty18\] for intensity·cosθ′/d². The box counts as its bounding sphere, and everything is
     /// seen in all directions from within it.
     #[inline]
     fn importance(&self, from: &Receiver, per_scene: f32) -> [f32; WIDTH] {

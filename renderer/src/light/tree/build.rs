@@ -29,7 +29,7 @@ enum Kind {
     Inner([u32; 2]),
 }
 
-/// Bins of candidate splits along an axis, as in \[Pharr23\] section 12.6.3.
+/// Bins of candidate splits along an axis, as in \[Pharr23\] section 12.6.
 const BINS: usize = 12;
 /// Below this level nodes are halved, whatever the cost: clusters within clusters cannot make the recursion deep.
 const LEVELS_BY_COST: u32 = 64;
@@ -87,7 +87,7 @@ impl LightTree {
 
 /// Up to eight nodes that together are the inner node `root`: the dearest one is opened until there are eight.
 ///
-/// **Source**: \[Wald08\] section 3.2.
+/// **Source**: \[Wald08\].
 fn branches(arena: &[Binary], root: u32) -> Vec<u32> {
     let mut open = vec![root];
     while open.len() < WIDTH {
