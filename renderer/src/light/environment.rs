@@ -114,8 +114,10 @@ impl Environment {
         let within = (place * self.tiles as f32 - Vec2::new(column as f32, row as f32)).clamp(Vec2::ZERO, Vec2::ONE);
 
         // The texel in the tile, and the place in the texel.
-        let importances = tile.map(|row| row.map(|texel| self.importance(texel)));
-        let (y, v) = choose(&importances.map(|row| row.iter().sum::<f32>()), within.y)?;
+        let importances: [[f32; TILE]; TILE] =
+            std::array::from_fn(|y| std::array::from_fn(|x| self.importance(tile[y][x])));
+        let rows: [f32; TILE] = std::array::from_fn(|y| importances[y].iter().sum());
+        let (y, v) = choose(&rows, within.y)?;
         let (x, u) = choose(&importances[y], within.x)?;
         let corner = Vec2::new((column * TILE + x) as f32, (row * TILE + y) as f32);
         // Not so near the next texel that the sum rounds to it.

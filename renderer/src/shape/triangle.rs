@@ -17,13 +17,21 @@ pub struct Triangle {
     /// Cosines between `n` and the vertex normals: the emitting side follows the interpolated vertex normal.
     facing: [f32; 3],
     area: f32,
+    centroid: Vec3,
+    /// Square of the distance from the centroid within which the spherical triangle is sampled: see [`NEAR`].
+    near_squared: f32,
     /// Angle by which the plane that a ray is tested against may be tilted from the exact one, about vertex 0.
     tilt: f32,
 }
 
-/// Solid angles (sr) between which the spherical triangle is sampled. Below, the density over area varies so little that
-/// area sampling does as well and is cheaper; near a hemisphere (2π) its three great circles coincide and the angles
-/// between them lose all precision, and sampling the BSDF is the better strategy anyway.
+/// Distance of the centroid, in longest edges, up to which the spherical triangle is sampled. Beyond, distance and angle of
+/// emission vary so little over the triangle that area sampling does as well, at a fraction of the price: the vertices are
+/// at most 2/3 of an edge from the centroid, so at 3 edges the square of the distance is within (1 ± 2/9)² of its mean.
+const NEAR: f32 = 3.0;
+
+/// Solid angles (sr) between which the spherical triangle is sampled where it is near. Below, seen edge on, area sampling
+/// does as well; near a hemisphere (2π) its three great circles coincide and the angles between them lose all precision,
+/// and sampling the BSDF is the better strategy anyway.
 ///
 /// **Source**: \[Pharr23\] section 6.5.4.
 const SOLID_ANGLES: std::ops::RangeInclusive<f64> = 2e-4..=6.22;
@@ -54,7 +62,10 @@ impl Triangle {
             None => (if flipped { -n } else { n }, [1.0; 3]),
         };
         let tilt = gamma(4) * (products.length() / doubled_area) as f32;
-        Some(Self { p, uv: uv.unwrap_or(DEFAULT_UV), n, facing, area, tilt })
+        let longest = e1.length_squared().max(e2.length_squared()).max((p2 - p1).length_squared()) as f32;
+        let centroid = ((p0 + p1 + p2) / 3.0).as_vec3();
+        let near_squared = NEAR * NEAR * longest;
+        Some(Self { p, uv: uv.unwrap_or(DEFAULT_UV), n, facing, area, centroid, near_squared, tilt })
     }
 
     /// Surface area.
@@ -90,11 +101,10 @@ impl Triangle {
 
     /// See [`super::Shape::sample`].
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<ShapeSample> {
-        let seen = SphericalTriangle::new(&self.p, from);
-        if !SOLID_ANGLES.contains(&seen.solid_angle) {
+        let Some(seen) = self.worth_sampling(from) else {
             let b = warp::uniform_triangle(u).as_dvec2();
             return self.sample_at(b.x, b.y, |point, n| solid_angle_pdf(1.0 / f64::from(self.area), from, point, n));
-        }
+        };
         let direction = seen.sample(u.x.into(), u.y.into());
         let (_, b1, b2) = self.ray(from.as_dvec3(), direction)?;
         // The direction lies inside the spherical triangle; what is outside the planar one is rounding.
@@ -106,12 +116,19 @@ impl Triangle {
 
     /// See [`super::Shape::pdf`].
     pub fn pdf(&self, from: Vec3, point: Vec3, n: Vec3) -> f32 {
-        let solid_angle = SphericalTriangle::new(&self.p, from).solid_angle;
-        if SOLID_ANGLES.contains(&solid_angle) {
-            (1.0 / solid_angle) as f32
-        } else {
-            finite_solid_angle_pdf(1.0 / f64::from(self.area), from, point, n)
+        match self.worth_sampling(from) {
+            Some(seen) => (1.0 / seen.solid_angle) as f32,
+            None => finite_solid_angle_pdf(1.0 / f64::from(self.area), from, point, n),
         }
+    }
+
+    /// The spherical triangle, where it is to be sampled rather than the area.
+    fn worth_sampling(&self, from: Vec3) -> Option<SphericalTriangle> {
+        if (from - self.centroid).length_squared() > self.near_squared {
+            return None;
+        }
+        let seen = SphericalTriangle::new(&self.p, from);
+        SOLID_ANGLES.contains(&seen.solid_angle).then_some(seen)
     }
 
     /// The sample at barycentric coordinates `b0`, `b1` of vertices 0 and 1.
