@@ -136,6 +136,7 @@ impl Bsdf<'_> {
     }
 
     /// Roughened where it is smoother than alpha = 0.3, as pbrt-v4 does after a diffuse bounce. A pane stays as it is.
+    #[cold]
     pub fn regularized(self) -> Self {
         match self {
             Self::Conductor(b) => Self::Conductor(Conductor { ggx: b.ggx.regularized(), ..b }),

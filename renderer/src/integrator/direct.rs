@@ -46,9 +46,9 @@ pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> Rgb {
 #[derive(Clone, Copy)]
 pub struct Vertex<'a> {
     /// The surface there.
-    pub surface: SurfaceInteraction<'a>,
+    pub surface: &'a SurfaceInteraction<'a>,
     /// What it does.
-    pub shading: Shading<'a>,
+    pub shading: &'a Shading<'a>,
     /// Where the path came from, in the frame of `shading`.
     pub wo: LocalDir,
 }

@@ -50,7 +50,7 @@ pub fn trace<Q: Queries>(
         if world.integrator.regularize && path.roughened {
             shading.bsdf = shading.bsdf.regularized();
         }
-        let vertex = Vertex { wo: shading.frame.to_local(surface.wo), surface, shading };
+        let vertex = Vertex { wo: shading.frame.to_local(surface.wo), surface: &surface, shading: &shading };
         if path.bounce == 0 {
             sample.alpha = 1.0;
             sample.first = if first_hit { vertex.first_hit() } else { FirstHit::default() };
@@ -66,8 +66,9 @@ pub fn trace<Q: Queries>(
         path.scatter(&vertex, &next);
         counters.scatterings += 1;
 
-        let u = numbers.d1(Dimension::at(path.bounce, Use::Roulette));
-        let Some(worth) = roulette::survive(path.beta.max_element() * path.eta_scale, path.bounce, u) else { break };
+        let throughput = path.beta.max_element() * path.eta_scale;
+        let u = || numbers.d1(Dimension::at(path.bounce, Use::Roulette));
+        let Some(worth) = roulette::survive(throughput, path.bounce, u) else { break };
         path.beta *= worth;
     }
     sample.radiance = path.radiance;
