@@ -99,3 +99,35 @@ fn the_path_loop_fits_on_a_screen() {
     println!("the path loop has {length} lines");
     assert!(length <= 60, "the path loop has {length} lines, more than the 60 that a screen holds");
 }
+
+#[test]
+fn every_source_that_is_cited_is_in_the_bibliography() {
+    let bibliography = fs::read_to_string(root().join("BIBLIOGRAPHY.md")).unwrap();
+    let is_key = |text: &str| {
+        let (name, rest) = text.split_at(text.find(|c: char| c.is_ascii_digit()).unwrap_or(text.len()));
+        name.len() > 2
+            && name.starts_with(|c: char| c.is_ascii_uppercase())
+            && name.chars().all(|c| c.is_ascii_alphabetic())
+            && rest.len() >= 2
+            && rest[..2].chars().all(|c| c.is_ascii_digit())
+            && rest.len() <= 3
+    };
+    let (mut found, mut missing) = (0, Vec::new());
+    for room in ["embree-sys", "embree", "oiio", "renderer", "cli"] {
+        for file in rust_files(&root().join(room)) {
+            let text = fs::read_to_string(&file).unwrap();
+            // A citation is \[Key\] in documentation and [Key] elsewhere.
+            for key in text.split('[').skip(1).filter_map(|rest| rest.split(']').next()) {
+                let key = key.trim_end_matches('\\');
+                if is_key(key) {
+                    found += 1;
+                    if !bibliography.contains(&format!("| {key} |")) {
+                        missing.push(format!("{}: {key}", file.display()));
+                    }
+                }
+            }
+        }
+    }
+    assert!(found > 20, "only {found} citations: are they still written as keys in brackets?");
+    assert!(missing.is_empty(), "not in BIBLIOGRAPHY.md:\n{}", missing.join("\n"));
+}
