@@ -16,7 +16,7 @@
 //!
 //! # Invariants
 //! Modules are declared in the order in which they may use each other: each uses only what stands above it. Nothing
-//! before `compile` knows Embree; nothing after it knows the scene file; after `compile` nothing fails on input. There
+//! before `interaction` knows Embree; nothing after `compile` knows the scene file; after `compile` nothing fails on input. There
 //! is no global epsilon, no clock that a pixel could depend on, and no `unsafe`.
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,5 @@
 //! Our pictures of scenes by others against the pictures that other renderers made of them.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use tests::image::{agreement, read_exr};
 use tests::{render, shared};

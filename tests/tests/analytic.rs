@@ -1,4 +1,5 @@
 //! Scenes whose one value is known in closed form: the derivation is in each scene's file.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use renderer::render::Job;
 use renderer::world::Techniques;

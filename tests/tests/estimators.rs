@@ -1,4 +1,5 @@
 //! Three ways to find the lights that must agree: sampling lights, sampling BSDFs, and both.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use renderer::render::{Frame, Job};
 use renderer::world::Techniques;

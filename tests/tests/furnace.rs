@@ -1,4 +1,5 @@
 //! Scenes whose radiance is known everywhere, because the same comes from everywhere.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use tests::render::{altered, mean_and_error};
 

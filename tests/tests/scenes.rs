@@ -1,4 +1,5 @@
 //! Every scene of others renders: no error, no sample rejected.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use tests::{render, shared};
 

@@ -1,4 +1,5 @@
 //! Rules of the house that a test can check.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
