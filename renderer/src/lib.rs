@@ -16,23 +16,23 @@
 //!
 //! # Invariants
 //! Modules are declared in the order in which they may use each other: each uses only what stands above it. Nothing
-//! before `interaction` knows Embree; nothing after `compile` knows the scene file; after `compile` nothing fails on input. There
-//! is no global epsilon, no clock that a pixel could depend on, and no `unsafe`.
+//! before `interaction` knows Embree; nothing after `compile` knows the scene file, or fails on input. There is no
+//! global epsilon, no clock that a pixel could depend on, and no `unsafe`.
 #![forbid(unsafe_code)]
 
-pub mod bsdf;
-pub mod camera;
-pub mod compile;
-pub mod film;
-pub mod integrator;
-pub mod interaction;
-pub mod light;
-pub mod material;
 pub mod math;
-pub mod render;
 pub mod sampling;
+pub mod spectrum;
 pub mod scene;
 pub mod shape;
-pub mod spectrum;
 pub mod texture;
+pub mod camera;
+pub mod bsdf;
+pub mod material;
+pub mod light;
+pub mod interaction;
 pub mod world;
+pub mod compile;
+pub mod integrator;
+pub mod film;
+pub mod render;

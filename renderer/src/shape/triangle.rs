@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::{ShapeHit, ShapeSample, finite_solid_angle_pdf, in_range, rounded, solid_angle_pdf, usable};
-use crate::math::{gamma, warp};
+use super::{ShapeHit, ShapeSample, finite_solid_angle_pdf, in_range, solid_angle_pdf, usable};
+use crate::math::{PointWithError, gamma, warp};
 
 /// A triangle that emits.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +101,7 @@ impl Triangle {
     /// See [`super::Shape::sample`].
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<ShapeSample> {
         let Some(seen) = self.worth_sampling(from) else {
-            let b = warp::uniform_triangle(u).as_dvec2();
+            let b = warp::uniform_triangle(u);
             return self.sample_at(b.x, b.y, |point, n| solid_angle_pdf(1.0 / f64::from(self.area), from, point, n));
         };
         let direction = seen.sample(u.x.into(), u.y.into());
@@ -110,7 +110,7 @@ impl Triangle {
         let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
         let excess = (b1 + b2).max(1.0);
         let (b1, b2) = (b1 / excess, b2 / excess);
-        self.sample_at(1.0 - b1 - b2, b1, |_, _| (1.0 / seen.solid_angle) as f32)
+        self.sample_at((1.0 - b1 - b2) as f32, b1 as f32, |_, _| (1.0 / seen.solid_angle) as f32)
     }
 
     /// See [`super::Shape::pdf`].
@@ -131,14 +131,19 @@ impl Triangle {
     }
 
     /// The sample at barycentric coordinates `b0`, `b1` of vertices 0 and 1.
-    fn sample_at(&self, b0: f64, b1: f64, pdf: impl FnOnce(Vec3, Vec3) -> f32) -> Option<ShapeSample> {
-        let [p0, p1, p2] = self.p.map(Vec3::as_dvec3);
-        let b2 = 1.0 - b0 - b1;
-        let mut point = rounded(p0 * b0 + p1 * b1 + p2 * b2, DVec3::ZERO);
+    ///
+    /// The point errs by γ₃ of its three products, and by what b₂ is rounded, twice below 1, times vertex 2.
+    #[inline]
+    fn sample_at(&self, b0: f32, b1: f32, pdf: impl FnOnce(Vec3, Vec3) -> f32) -> Option<ShapeSample> {
+        let [p0, p1, p2] = self.p;
+        let b = [b0, b1, 1.0 - b0 - b1];
+        let products = [p0 * b[0], p1 * b[1], p2 * b[2]];
+        let size = products[0].abs() + products[1].abs() + products[2].abs();
+        let error = gamma(3) * size + gamma(2) * p2.abs() + Vec3::splat(f32::MIN_POSITIVE);
+        let mut point = PointWithError { p: products[0] + products[1] + products[2], error };
         // A shadow ray must end before the plane that it will be tested against.
         let deviation = self.tilt * (point.p - self.p[0]).length();
         point.error += self.n.abs() * deviation;
-        let b = [b0 as f32, b1 as f32, b2 as f32];
         let side = b[0] * self.facing[0] + b[1] * self.facing[1] + b[2] * self.facing[2];
         let n = if side < 0.0 { -self.n } else { self.n };
         let uv = self.uv[0] * b[0] + self.uv[1] * b[1] + self.uv[2] * b[2];
