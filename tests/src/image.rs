@@ -32,6 +32,17 @@ impl RgbImage {
         mean(self.pixels.iter())
     }
 
+    /// The image at `width` columns, each pixel the mean of a square of pixels.
+    ///
+    /// # Panics
+    /// If the size is not a whole multiple of the new one.
+    pub fn reduced(&self, width: usize) -> Self {
+        let factor = self.width / width;
+        assert!(factor > 0 && factor * width == self.width && self.height % factor == 0, "no whole multiple");
+        let pixels = self.block_means(factor).into_iter().map(|mean| mean.map(|channel| channel as f32)).collect();
+        Self { width, height: self.height / factor, pixels }
+    }
+
     /// Means of all whole and partial square blocks, row by row.
     pub fn block_means(&self, side: usize) -> Vec<[f64; 3]> {
         let mut means = Vec::new();
