@@ -1,0 +1,1 @@
+"""Tools to model in plain Python: vectors, meshes, images, and the writing of pbrt files."""
