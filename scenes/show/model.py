@@ -31,7 +31,7 @@ def view(out):
     out.line(f"LookAt {numbers((EYE, TARGET, (0, 0, 1)))}")
     # In focus: the middle of the table.
     out.line(f'Camera "perspective" "float fov" {FIELD_OF_VIEW} "float lensradius" 0.006 "float focaldistance" 2.42')
-    out.line('Film "rgb" "integer xresolution" 1280 "integer yresolution" 720 "float iso" 170 "string filename" "show.exr"')
+    out.line('Film "rgb" "integer xresolution" 1280 "integer yresolution" 720 "float iso" 210 "string filename" "show.exr"')
     out.line('PixelFilter "gaussian" "float xradius" 1.5 "float yradius" 1.5 "float sigma" 0.5')
     out.line('Sampler "zsobol" "integer pixelsamples" 256')
     out.line('Integrator "path" "integer maxdepth" 16')

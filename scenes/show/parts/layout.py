@@ -5,7 +5,7 @@ WIDTH, FRONT, BACK, HEIGHT = 4.4, -1.7, 5.6, 3.0
 WALL = 0.35
 
 # All windows are in the wall x = 0: from and to in y, sill and head.
-WINDOWS = ((-1.45, -0.30), (1.0, 2.45), (3.45, 4.75))
+WINDOWS = ((-1.60, -0.15), (1.0, 2.45), (3.45, 4.75))
 SILL, HEAD = 0.92, 2.62
 
 # The table top.

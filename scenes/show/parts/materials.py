@@ -83,7 +83,7 @@ Texture "celadon" "spectrum" "mix" "rgb tex1" [ 0.16 0.33 0.29 ] "rgb tex2" [ 0.
 MakeNamedMaterial "celadon" "string type" "coateddiffuse" "texture reflectance" "celadon" "float roughness" 0.02
   "texture displacement" "glaze relief"
 
-# Metals.
+# Metals. Old copper is darker and redder than the pure metal.
 AttributeBegin
   Scale 0.02 0.02 0.05
   Texture "tarnish" "float" "wrinkled" "integer octaves" 6 "float roughness" 0.6
@@ -94,7 +94,7 @@ AttributeBegin
 AttributeEnd
 Texture "hammer relief" "float" "scale" "texture tex" "hammering" "float scale" 0.0003
 Texture "copper roughness" "float" "mix" "float tex1" 0.01 "float tex2" 0.08 "texture amount" "tarnish"
-MakeNamedMaterial "copper" "string type" "conductor" "spectrum eta" "metal-Cu-eta" "spectrum k" "metal-Cu-k"
+MakeNamedMaterial "copper" "string type" "conductor" "rgb reflectance" [ 0.88 0.52 0.36 ]
   "texture roughness" "copper roughness" "texture displacement" "hammer relief"
 MakeNamedMaterial "brass" "string type" "conductor" "spectrum eta" "metal-CuZn-eta" "spectrum k" "metal-CuZn-k" "float roughness" 0.05
 MakeNamedMaterial "gilt" "string type" "conductor" "spectrum eta" "metal-Au-eta" "spectrum k" "metal-Au-k" "float roughness" 0.18
@@ -112,7 +112,7 @@ AttributeBegin
   Texture "pores" "float" "wrinkled" "integer octaves" 2
 AttributeEnd
 Texture "peel relief" "float" "scale" "texture tex" "pores" "float scale" 0.0005
-MakeNamedMaterial "lemon" "string type" "coateddiffuse" "rgb reflectance" [ 0.72 0.50 0.045 ] "float roughness" 0.22
+MakeNamedMaterial "lemon" "string type" "coateddiffuse" "rgb reflectance" [ 0.78 0.58 0.06 ] "float roughness" 0.22
   "texture displacement" "peel relief"
 MakeNamedMaterial "orange" "string type" "coateddiffuse" "rgb reflectance" [ 0.70 0.235 0.022 ] "float roughness" 0.2
   "texture displacement" "peel relief"
@@ -120,7 +120,7 @@ AttributeBegin
   Scale 0.012 0.012 0.02
   Texture "speckle" "float" "wrinkled" "integer octaves" 6 "float roughness" 0.65
 AttributeEnd
-Texture "pear skin" "spectrum" "mix" "rgb tex1" [ 0.55 0.50 0.10 ] "rgb tex2" [ 0.42 0.27 0.07 ] "texture amount" "speckle"
+Texture "pear skin" "spectrum" "mix" "rgb tex1" [ 0.62 0.56 0.13 ] "rgb tex2" [ 0.50 0.36 0.09 ] "texture amount" "speckle"
 MakeNamedMaterial "pear" "string type" "coateddiffuse" "texture reflectance" "pear skin" "float roughness" 0.25
 MakeNamedMaterial "stalk" "string type" "diffuse" "rgb reflectance" [ 0.11 0.07 0.035 ]
 

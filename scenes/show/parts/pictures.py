@@ -11,7 +11,7 @@ from .part import ROOT
 
 # The hue of the sun; pigments of the ceramics.
 SUN = (1.0, 0.732, 0.446)
-WHITE, BLUE = (0.70, 0.70, 0.66), (0.035, 0.075, 0.30)
+WHITE, BLUE = (0.80, 0.80, 0.76), (0.035, 0.075, 0.30)
 
 
 def write():

@@ -69,7 +69,7 @@ def skirting(out):
     """A row of tiles along the back and right walls, a tile of the image each 13 cm."""
     out.material("tiles")
     depth, top = 0.012, 2 * TILE
-    for a, b in (((0, BACK - depth), (WIDTH, BACK - depth)), ((WIDTH - depth, BACK), (WIDTH - depth, FRONT))):
+    for a, b in (((0, BACK - depth), (WIDTH, BACK - depth)), ((round(WIDTH - depth, 3), BACK), (round(WIDTH - depth, 3), FRONT))):
         length = abs(b[0] - a[0]) + abs(b[1] - a[1])
         points = f"{a[0]} {a[1]} 0  {b[0]} {b[1]} 0  {a[0]} {a[1]} {top}  {b[0]} {b[1]} {top}"
         u, v = length / (4 * TILE), top / TILE

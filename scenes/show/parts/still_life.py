@@ -208,9 +208,9 @@ def pears(out):
     stalk = bezier([(tip, 0, 0.100), (tip + 0.004, 0, 0.115), (tip + 0.012, 0.002, 0.128), (tip + 0.013, 0.005, 0.136)], 8)
     out.mesh("pear_stalk", tube(stalk, lambda t: 0.0016 + 0.0012 * t**3, 8), "stalk")
     out.line("ObjectEnd")
-    out.begin().line(f"Translate 1.80 1.735 {TABLE + 0.0012:.4f}").line("Rotate 160 0 0 1").line('ObjectInstance "pear"').end()
+    out.begin().line(f"Translate 1.80 1.735 {TABLE + 0.0011:.4f}").line("Rotate 160 0 0 1").line('ObjectInstance "pear"').end()
     # On its side it touches with belly and neck; the neck is the thinner, so the axis dips towards it.
-    out.begin().line(f"Translate 1.745 1.655 {TABLE + 0.0395:.4f}").line("Rotate 205 0 0 1").line("Rotate 101 0 1 0")
+    out.begin().line(f"Translate 1.745 1.655 {TABLE + 0.0459:.4f}").line("Rotate 205 0 0 1").line("Rotate 97 0 1 0")
     out.line("Translate 0 0 -0.034").line('ObjectInstance "pear"').end()
 
 
