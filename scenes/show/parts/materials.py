@@ -139,7 +139,7 @@ MakeNamedMaterial "shade" "string type" "diffusetransmission" "rgb reflectance" 
 MakeNamedMaterial "paper" "string type" "diffuse" "rgb reflectance" [ 0.62 0.56 0.44 ]
 MakeNamedMaterial "red leather" "string type" "coateddiffuse" "rgb reflectance" [ 0.24 0.045 0.03 ] "float roughness" 0.3
 MakeNamedMaterial "blue leather" "string type" "coateddiffuse" "rgb reflectance" [ 0.045 0.075 0.13 ] "float roughness" 0.3
-MakeNamedMaterial "wax" "string type" "coateddiffuse" "rgb reflectance" [ 0.68 0.60 0.44 ] "float roughness" 0.35
+MakeNamedMaterial "wax" "string type" "diffuse" "rgb reflectance" [ 0.70 0.62 0.46 ]
 MakeNamedMaterial "black" "string type" "diffuse" "rgb reflectance" [ 0.03 0.03 0.03 ]
 """
 
