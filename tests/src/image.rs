@@ -68,6 +68,28 @@ fn mean<'a>(pixels: impl Iterator<Item = &'a [f32; 3]>) -> [f64; 3] {
     sum.map(|channel| channel / count.max(1) as f64)
 }
 
+/// Both images without the pixels that are among the brightest `share` of either: those become black in both.
+///
+/// # Panics
+/// If the sizes differ.
+pub fn without_brightest(a: &RgbImage, b: &RgbImage, share: f64) -> (RgbImage, RgbImage) {
+    assert_eq!((a.width, a.height), (b.width, b.height), "the images differ in size");
+    let brightness = |pixel: &[f32; 3]| pixel.iter().copied().fold(0.0, f32::max);
+    let limit = |image: &RgbImage| {
+        let mut sorted: Vec<f32> = image.pixels.iter().map(brightness).collect();
+        sorted.sort_by(f32::total_cmp);
+        sorted[((1.0 - share) * (sorted.len() - 1) as f64) as usize]
+    };
+    let (limit_a, limit_b) = (limit(a), limit(b));
+    let (mut a, mut b) = (a.clone(), b.clone());
+    for (a, b) in a.pixels.iter_mut().zip(&mut b.pixels) {
+        if brightness(a) > limit_a || brightness(b) > limit_b {
+            (*a, *b) = ([0.0; 3], [0.0; 3]);
+        }
+    }
+    (a, b)
+}
+
 /// How an image agrees with a reference.
 #[derive(Clone, Debug)]
 pub struct Agreement {

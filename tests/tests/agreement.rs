@@ -1,7 +1,7 @@
 //! Our pictures of scenes by others against the pictures that other renderers made of them.
 #![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
-use tests::image::{RgbImage, agreement, read_exr};
+use tests::image::{RgbImage, agreement, read_exr, without_brightest};
 use tests::{render, shared};
 
 /// One reference and how near to it we must be.
@@ -12,6 +12,9 @@ struct Case {
     /// By an RGB renderer, whose mean counts within [`RGB`]: where light bounces between saturated surfaces, the products of
     /// channels that such renderers take are not what a spectral one finds.
     rgb_reference: Option<&'static str>,
+    /// The mean is judged without the brightest thousandth of the pixels: five pixels of bmw-m6's reference, where a path
+    /// happened to meet the sun by way of glass, hold 4 % of the mean of its 87,500.
+    trimmed: bool,
     /// Largest relative difference of the image mean, any channel.
     mean: f64,
     /// Largest median over blocks of the relative difference; infinite where the reference is too noisy for blocks.
@@ -27,7 +30,8 @@ const RGB: f64 = 0.02;
 #[test]
 fn images_agree_with_those_of_other_renderers() {
     let Some(folder) = shared::folder() else { return };
-    let case = |scene, reference, mean, blocks| Case { scene, reference, rgb_reference: None, mean, blocks };
+    let case =
+        |scene, reference, mean, blocks| Case { scene, reference, rgb_reference: None, trimmed: false, mean, blocks };
     let tungsten = Some("scenes/cornell-box/reference-tungsten.exr");
     let cases = [
         Case { rgb_reference: tungsten, ..case("cornell-box", "cornell-box-256x256-pbrt4-256spp", PBRT, 0.04) },
@@ -35,7 +39,7 @@ fn images_agree_with_those_of_other_renderers() {
         case("coffee", "coffee-256x320-pbrt4-256spp", PBRT, 0.04),
         case("kitchen", "kitchen-320x180-pbrt4-256spp", PBRT, 0.04),
         case("living-room", "living-room-320x180-pbrt4-256spp", PBRT, 0.04),
-        case("bmw-m6", "bmw-m6-350x250-pbrt4-256spp", PBRT, 0.04),
+        Case { trimmed: true, ..case("bmw-m6", "bmw-m6-350x250-pbrt4-256spp", PBRT, 0.04) },
         case("house", "house-320x180-pbrt4-256spp", PBRT, 0.04),
         case("buddha-fractal", "buddha-fractal-250x400-pbrt4-256spp", PBRT, 0.04),
         case("veach-ajar", "veach-ajar-320x180-pbrt4-256spp", 0.06, f64::INFINITY),
@@ -69,6 +73,15 @@ fn judge(case: &Case, by: &str, image: &RgbImage, reference: &RgbImage, mean: f6
         "{:15} {by:5} mean {r:.4} {g:.4} {b:.4}  blocks {:.4}  {seconds:.1} s",
         case.scene, found.median_block_difference
     );
-    let worst = found.mean_ratio.iter().map(|ratio| (ratio - 1.0).abs()).fold(0.0, f64::max);
+    let judged = if case.trimmed {
+        let (image, reference) = without_brightest(image, reference, 1e-3);
+        let trimmed = agreement(&image, &reference).mean_ratio;
+        let [r, g, b] = trimmed;
+        println!("{:15} {by:5} mean {r:.4} {g:.4} {b:.4}  without the brightest thousandth", case.scene);
+        trimmed
+    } else {
+        found.mean_ratio
+    };
+    let worst = judged.iter().map(|ratio| (ratio - 1.0).abs()).fold(0.0, f64::max);
     worst <= mean && found.median_block_difference <= case.blocks
 }
