@@ -1,0 +1,312 @@
+//! The adaptive filter: cells as fine as the samples can tell apart.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::grid::{Anchor, CellKey, Grid};
+use crate::pairs::{Lobe as PairLobe, Pairs};
+use crate::record::{PathRecord, Vertex};
+use crate::shrink::{Shrinkage, estimate};
+use crate::sums::{Deposit, Quantum};
+use crate::table::{CellIndex, PerCell, ShardedTable, Table};
+
+/// Settings. The defaults are measured, not derived.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Params {
+    /// Shifted trees at the first vertex: deposits go to all, each path reads one.
+    pub trees: u32,
+    /// Shifted trees at the second vertex: each path reads all.
+    pub second_trees: u32,
+    /// Side of the finest cells at the first vertex, in footprints.
+    pub leaf: f32,
+    /// The same at the second vertex.
+    pub second_leaf: f32,
+    /// When differences between cells are believed.
+    pub shrinkage: Shrinkage,
+    /// Radiance of the order of the frame's mean: see [`Quantum`].
+    pub unit: f32,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            trees: 4,
+            second_trees: 2,
+            leaf: 2.0,
+            second_leaf: 4.0,
+            shrinkage: Shrinkage { tau: 2.5, trusted: 24.0, levels: 5 },
+            unit: 1.0,
+        }
+    }
+}
+
+/// What a slot gets. All are sums over its paths of what they bring, weighted as their throughputs are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Resolved {
+    /// Through diffuse lobes, filtered, and all of paths that no cell could take.
+    pub diffuse: Vec3,
+    /// Through glossy lobes, filtered.
+    pub glossy: Vec3,
+    /// Through glossy lobes with only the second vertices filtered: of even samples and of odd ones.
+    pub glossy_own: [Vec3; 2],
+}
+
+/// Counts of what the filter did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Paths with a selected vertex.
+    pub paths: u64,
+    /// Paths that no cell could take: radiance out of range or a place without a cell. They stay unfiltered.
+    pub unfiltered: u64,
+    /// Cells of all trees at the first vertex.
+    pub cells: u64,
+    /// Cells of all trees at the second vertex, in the last block.
+    pub second_cells: u64,
+    /// Pairs of slot and cell.
+    pub pairs: u64,
+    /// Bytes held between blocks.
+    pub bytes: u64,
+}
+
+/// A tree of cells with a place for each vertex.
+#[derive(Debug)]
+struct Tree {
+    grid: Grid,
+    cells: ShardedTable,
+}
+
+impl Tree {
+    fn several(anchor: &Anchor, count: u32) -> Vec<Self> {
+        (0..count).map(|index| Self { grid: Grid::new(anchor, index, count), cells: ShardedTable::default() }).collect()
+    }
+
+    /// The finest cell for a vertex.
+    #[inline]
+    fn leaf(&self, vertex: &Vertex, side: f32, bin: u8) -> Option<CellKey> {
+        let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
+        self.grid.leaf(vertex.p, vertex.n.get(), side * vertex.footprint.get(), attributes)
+    }
+}
+
+/// Sums over all paths so far.
+#[derive(Debug)]
+pub struct Adaptive {
+    params: Params,
+    quantum: Quantum,
+    diffuse: Vec<Tree>,
+    glossy: Vec<Tree>,
+    second: Vec<Tree>,
+    /// By part.
+    pairs: Vec<Pairs>,
+    report: Report,
+}
+
+impl Adaptive {
+    /// An empty filter over `parts` disjoint sets of slots.
+    pub fn new(params: &Params, anchor: &Anchor, parts: usize) -> Self {
+        Self {
+            params: *params,
+            quantum: Quantum::new(params.unit),
+            diffuse: Tree::several(anchor, params.trees),
+            glossy: Tree::several(anchor, params.trees),
+            second: Tree::several(anchor, params.second_trees),
+            pairs: (0..parts).map(|_| Pairs::default()).collect(),
+            report: Report::default(),
+        }
+    }
+
+    /// Adds a block of paths, by part. A slot belongs to one part for good.
+    ///
+    /// Second vertices share within the block: what a block is decides the result, who traces it does not.
+    ///
+    /// # Panics
+    /// If there are not as many parts as were announced.
+    pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
+        assert_eq!(parts.len(), self.pairs.len(), "parts of a block");
+        let suffixes = self.suffixes(parts);
+        let counts: Vec<(u64, u64)> = (&mut self.pairs, parts, &suffixes)
+            .into_par_iter()
+            .map(|(pairs, records, suffixes)| {
+                let mut block = FirstVertices::new(&self.params, &self.quantum, &self.diffuse, &self.glossy);
+                for (record, &suffix) in records.iter().zip(suffixes) {
+                    block.add(record, suffix, pairs);
+                }
+                block.finish(pairs)
+            })
+            .collect();
+        self.report.paths += parts.iter().map(|records| records.len() as u64).sum::<u64>();
+        self.report.unfiltered += counts.iter().map(|(_, unfiltered)| unfiltered).sum::<u64>();
+    }
+
+    /// What arrives at the second vertex of each path, filtered over the block.
+    fn suffixes(&mut self, parts: &[Vec<PathRecord>]) -> Vec<Vec<Vec3>> {
+        let trees = &self.second;
+        let places: Vec<Vec<CellIndex>> = parts
+            .par_iter()
+            .map(|records| second_vertices(records, trees, self.params.second_leaf, &self.quantum))
+            .collect();
+        let estimates: Vec<PerCell<[f32; 3]>> = self
+            .second
+            .par_iter_mut()
+            .map(|tree| estimate(&mut tree.cells, &self.quantum, &self.params.shrinkage))
+            .collect();
+        let count = self.second.len();
+        let read = |places: &[CellIndex], own: Vec3| match places[0] {
+            NO_CELL => own,
+            _ => {
+                let values = places.iter().zip(&estimates).map(|(&place, tree)| Vec3::from_array(tree.get(place)));
+                values.sum::<Vec3>() / count as f32
+            }
+        };
+        let suffixes = parts
+            .par_iter()
+            .zip(&places)
+            .map(|(records, places)| {
+                let pairs = records.iter().zip(places.chunks_exact(count));
+                pairs.map(|(record, places)| read(places, record.suffix.get())).collect()
+            })
+            .collect();
+        self.report.second_cells = self.second.iter_mut().map(|tree| tree.cells.len() as u64).sum();
+        self.second.iter_mut().for_each(|tree| tree.cells.clear());
+        suffixes
+    }
+
+    /// What each slot of each part gets from all paths so far; slots without a path are left out.
+    pub fn resolve(&mut self) -> Vec<Vec<(u32, Resolved)>> {
+        let (quantum, shrinkage) = (&self.quantum, &self.params.shrinkage);
+        let estimates = |trees: &mut Vec<Tree>| -> Vec<PerCell<[f32; 3]>> {
+            trees.par_iter_mut().map(|tree| estimate(&mut tree.cells, quantum, shrinkage)).collect()
+        };
+        let (diffuse, glossy) = (estimates(&mut self.diffuse), estimates(&mut self.glossy));
+        let read = |lobe: PairLobe, tree: usize, cell: CellIndex| match lobe {
+            PairLobe::Diffuse => diffuse[tree].get(cell),
+            PairLobe::Glossy => glossy[tree].get(cell),
+        };
+        self.pairs.par_iter_mut().map(|pairs| pairs.resolve(quantum, read)).collect()
+    }
+
+    /// What was done so far.
+    pub fn report(&mut self) -> Report {
+        let trees = self.diffuse.iter_mut().chain(&mut self.glossy);
+        let (mut cells, mut bytes) = (0, 0);
+        for tree in trees {
+            cells += tree.cells.len() as u64;
+            bytes += tree.cells.bytes() as u64;
+        }
+        let pairs = self.pairs.iter().map(|pairs| pairs.len() as u64).sum();
+        bytes += self.pairs.iter().map(|pairs| pairs.bytes() as u64).sum::<u64>();
+        Report { cells, pairs, bytes, ..self.report }
+    }
+}
+
+/// In place of a cell's index: the path keeps its own.
+const NO_CELL: CellIndex = CellIndex::MAX;
+
+/// Deposits the second vertices of a part; places of the cells, by record and tree.
+fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Vec<CellIndex> {
+    let mut places = vec![NO_CELL; records.len() * trees.len()];
+    let deposits: Vec<Option<Deposit>> = records
+        .iter()
+        .map(|record| quantum.deposit(record.suffix.get(), record.odd()).filter(|_| record.second.exists()))
+        .collect();
+    let mut batch = Vec::new();
+    for (at, tree) in trees.iter().enumerate() {
+        batch.clear();
+        for (i, (record, deposit)) in records.iter().zip(&deposits).enumerate() {
+            let Some(deposit) = deposit else { continue };
+            if let Some(key) = tree.leaf(&record.second, side, 0) {
+                batch.push((key, *deposit, (i * trees.len() + at) as u32));
+            }
+        }
+        tree.cells.add(&mut batch, &mut places);
+    }
+    // A vertex too far away for one tree's cells stays out of all.
+    for places in places.chunks_exact_mut(trees.len()).filter(|places| places.contains(&NO_CELL)) {
+        places.fill(NO_CELL);
+    }
+    places
+}
+
+/// The first vertices of a part of a block, gathered in small tables before they go to the large ones: neighbouring
+/// pixels share cells, so this saves most of the way to memory.
+struct FirstVertices<'a> {
+    params: &'a Params,
+    quantum: &'a Quantum,
+    diffuse: Vec<(&'a Tree, Table)>,
+    glossy: Vec<(&'a Tree, Table)>,
+    unfiltered: u64,
+}
+
+impl<'a> FirstVertices<'a> {
+    fn new(params: &'a Params, quantum: &'a Quantum, diffuse: &'a [Tree], glossy: &'a [Tree]) -> Self {
+        let local = |trees: &'a [Tree]| trees.iter().map(|tree| (tree, Table::default())).collect();
+        Self { params, quantum, diffuse: local(diffuse), glossy: local(glossy), unfiltered: 0 }
+    }
+
+    fn add(&mut self, record: &PathRecord, suffix: Vec3, pairs: &mut Pairs) {
+        let glossy = record.glossy.incident(suffix);
+        if !record.glossy.is_black() {
+            pairs.add_own(record.slot, record.odd(), record.glossy.throughput.get() * glossy, self.quantum);
+        }
+        let mut kept = true;
+        for (lobe, incident, trees, kind) in [
+            (&record.diffuse, record.diffuse.incident(suffix), &mut self.diffuse, PairLobe::Diffuse),
+            (&record.glossy, glossy, &mut self.glossy, PairLobe::Glossy),
+        ] {
+            if lobe.is_black() {
+                continue;
+            }
+            let bin = if kind == PairLobe::Glossy { record.first.bin() } else { 0 };
+            let cell =
+                self.quantum.deposit(incident, record.odd()).filter(|_| record.first.exists()).and_then(|deposit| {
+                    deposit_in_all(trees, &record.first, self.params.leaf, bin, record.sample(), &deposit)
+                });
+            let throughput = lobe.throughput.get();
+            match cell {
+                Some((tree, cell)) if pairs.add(record.slot, kind, tree, cell, throughput) => {}
+                _ => {
+                    kept = false;
+                    pairs.add_unfiltered(record.slot, kind, throughput * incident, self.quantum);
+                }
+            }
+        }
+        self.unfiltered += u64::from(!kept);
+    }
+
+    /// Moves everything to the large tables.
+    fn finish(self, pairs: &mut Pairs) -> (u64, u64) {
+        let mut indices = Vec::new();
+        for (kind, trees) in [(PairLobe::Diffuse, &self.diffuse), (PairLobe::Glossy, &self.glossy)] {
+            for (at, (tree, local)) in trees.iter().enumerate() {
+                tree.cells.merge(local, &mut indices);
+                pairs.renumber(kind, at as u32, &indices);
+            }
+        }
+        pairs.end_block();
+        (0, self.unfiltered)
+    }
+}
+
+/// Adds to a cell of every tree; the tree that the path reads, and the number of its cell there.
+#[inline]
+fn deposit_in_all(
+    trees: &mut [(&Tree, Table)],
+    vertex: &Vertex,
+    side: f32,
+    bin: u8,
+    sample: u8,
+    deposit: &Deposit,
+) -> Option<(u32, u32)> {
+    let read = u32::from(sample) % trees.len() as u32;
+    let mut place = None;
+    // Either all trees have a place for the vertex or none: they differ by less than a factor of two in extent.
+    for (at, (tree, local)) in trees.iter_mut().enumerate() {
+        let key = tree.leaf(vertex, side, bin)?;
+        let cell = local.cell(key);
+        local.add(cell, deposit);
+        if at as u32 == read {
+            place = Some((read, cell));
+        }
+    }
+    place
+}

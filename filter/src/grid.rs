@@ -1,0 +1,213 @@
+//! Where a vertex falls: nested cubic cells, shifted differently in each of several trees.
+
+use glam::{DVec3, Vec3};
+
+use crate::hash::mix64;
+
+/// What all cells are measured from. Anchored to the camera, so that neither the scene's scale nor its distance from the
+/// origin changes which vertices meet: positions are differenced in f64, sides are powers of two times the footprint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchor {
+    /// The camera's place, world space.
+    pub origin: DVec3,
+    /// A length of the order of the scene, world units; only its power of two counts. The trees' shifts scale with it.
+    pub extent: f64,
+}
+
+/// A cell: exact, so that two cells are never taken for one.
+///
+/// From the top: level (16 bits, biased), attributes (48), Morton code of the cell's three
+/// coordinates in two's complement (63). Sorted, the
+/// cells of a level come together, among them those of equal attributes, and among them siblings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct CellKey(u128);
+
+/// Bits of each coordinate of a cell.
+const COORDINATE_BITS: u32 = 21;
+const LEVEL_BIAS: i32 = 1 << 14;
+
+impl CellKey {
+    /// Cell ⌊`position`⌋ of a level. `None` beyond ±2²⁰ cells, further away than any footprint is small.
+    #[inline]
+    fn new(level: i32, attributes: u64, position: DVec3) -> Option<Self> {
+        const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
+        let cell = position.floor();
+        if !(cell.min_element() >= -HALF && cell.max_element() < HALF) {
+            return None;
+        }
+        let part = |x: f64| spread(i64::from(x as i32) as u64);
+        let morton = part(cell.x) | part(cell.y) << 1 | part(cell.z) << 2;
+        let level = (level + LEVEL_BIAS) as u16;
+        Some(Self(u128::from(level) << 112 | u128::from(attributes & ATTRIBUTES) << 64 | u128::from(morton)))
+    }
+
+    /// log₂ of the cell's side, in units of its tree.
+    #[inline]
+    pub fn level(self) -> i32 {
+        (self.0 >> 112) as i32 - LEVEL_BIAS
+    }
+
+    /// The cell of twice the side that holds this one. The order of cells is kept, so siblings are neighbours.
+    #[inline]
+    pub fn parent(self) -> Self {
+        let morton = self.0 as u64;
+        // An arithmetic shift of each coordinate: the three signs stay on top.
+        let halved = morton >> 3 | morton & SIGNS;
+        Self((self.0 >> 64 << 64) + (1 << 112) | u128::from(halved))
+    }
+
+    /// Well mixed bits.
+    #[inline]
+    pub fn hash(self) -> u64 {
+        mix64(self.0 as u64 ^ mix64((self.0 >> 64) as u64))
+    }
+
+    /// All bits, to be stored.
+    pub fn bits(self) -> u128 {
+        self.0
+    }
+
+    /// From [`Self::bits`].
+    pub fn from_bits(bits: u128) -> Self {
+        Self(bits)
+    }
+}
+
+/// The signs of the three coordinates in a Morton code.
+const SIGNS: u64 = 7 << (3 * (COORDINATE_BITS - 1));
+
+/// Attributes that fit in a key.
+const ATTRIBUTES: u64 = (1 << 48) - 1;
+
+/// Puts two zeros between the lower 21 bits of a number.
+#[inline]
+fn spread(x: u64) -> u64 {
+    let mut x = x & 0x1f_ffff;
+    x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// One tree of nested cells.
+///
+/// Trees differ in where their cells' borders lie at every level, and in the sides of their cells by less than two, so
+/// that the mean over trees shows no borders. Sides are `scale` × 2^level.
+#[derive(Clone, Copy, Debug)]
+pub struct Grid {
+    /// World position of the corner of all cells.
+    corner: DVec3,
+    inverse_scale: f64,
+}
+
+impl Grid {
+    /// Tree `index` of `count`.
+    pub fn new(anchor: &Anchor, index: u32, count: u32) -> Self {
+        // Far above the largest cells, so that every level's borders are shifted at random; a power of two, so that a
+        // scene scaled by one keeps its cells.
+        let reach = 2f64.powi(exponent_of(anchor.extent) + 2);
+        let random = |axis: u64| (mix64(u64::from(index) << 2 | axis) >> 11) as f64 / (1u64 << 53) as f64;
+        let shift = DVec3::new(random(0), random(1), random(2)) * reach;
+        let scale = 2f64.powf(f64::from(index) / f64::from(count));
+        Self { corner: anchor.origin - shift, inverse_scale: scale.recip() }
+    }
+
+    /// The finest cell for a vertex at `p` that faces `n`, at least `side` / 2 and less than `side` wide before the tree's
+    /// scale. `attributes`: 45 bits that vertices must agree in to meet. `None` if the place is too far for its footprint.
+    #[inline]
+    pub fn leaf(&self, p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Option<CellKey> {
+        let level = exponent_of(f64::from(side)) - 1;
+        let position = (Vec3::from_array(p).as_dvec3() - self.corner) * self.inverse_scale * power_of_two(-level);
+        CellKey::new(level, attributes << 3 | u64::from(facing(n)), position)
+    }
+}
+
+/// Which of the six faces of a cube `n` points to.
+#[inline]
+fn facing(n: Vec3) -> u32 {
+    let a = n.abs();
+    let (axis, component) = if a.x >= a.y && a.x >= a.z {
+        (0, n.x)
+    } else if a.y >= a.z {
+        (1, n.y)
+    } else {
+        (2, n.z)
+    };
+    2 * axis + u32::from(component < 0.0)
+}
+
+/// ⌊log₂ x⌋ of a positive normal number.
+#[inline]
+fn exponent_of(x: f64) -> i32 {
+    (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
+}
+
+/// 2ᵉ for |e| < 1023.
+#[inline]
+fn power_of_two(e: i32) -> f64 {
+    f64::from_bits(((1023 + e) as u64) << 52)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const ANCHOR: Anchor = Anchor { origin: DVec3::new(3.0, -2.0, 7.0), extent: 20.0 };
+
+    proptest! {
+        #[test]
+        fn cells_nest(x in -20.0f32..20.0, y in -20.0f32..20.0, z in -20.0f32..20.0, tree in 0u32..4, up in 1i32..8) {
+            let grid = Grid::new(&ANCHOR, tree, 4);
+            let fine = grid.leaf([x, y, z], Vec3::Z, 0.01, 5).unwrap();
+            let coarse = grid.leaf([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5).unwrap();
+            let ancestor = (0..up).fold(fine, |key, _| key.parent());
+            prop_assert_eq!(ancestor, coarse);
+            prop_assert_eq!(ancestor.level(), fine.level() + up);
+        }
+
+        #[test]
+        fn scaling_by_a_power_of_two_changes_the_level_alone(
+            x in -20.0f32..20.0, y in -20.0f32..20.0, side in 0.001f32..1.0, e in -20i32..=20, tree in 0u32..4,
+        ) {
+            let scale = power_of_two(e);
+            let scaled = Anchor { origin: ANCHOR.origin * scale, extent: ANCHOR.extent * scale };
+            let (a, b) = (Grid::new(&ANCHOR, tree, 4), Grid::new(&scaled, tree, 4));
+            let s = scale as f32;
+            let at = a.leaf([x, y, 1.0], Vec3::X, side, 1).unwrap();
+            let there = b.leaf([x * s, y * s, s], Vec3::X, side * s, 1).unwrap();
+            prop_assert_eq!(there.level(), at.level() + e);
+            prop_assert_eq!(there.bits() << 16, at.bits() << 16);
+        }
+
+        #[test]
+        fn parents_keep_the_order(a in any::<[i32; 3]>(), b in any::<[i32; 3]>()) {
+            let key = |c: [i32; 3]| CellKey::new(0, 9, DVec3::from_array(c.map(|x| f64::from(x >> 11)))).unwrap();
+            let (a, b) = (key(a), key(b));
+            prop_assert_eq!(a.cmp(&b).then(a.parent().cmp(&b.parent())), a.cmp(&b));
+        }
+    }
+
+    #[test]
+    fn normals_and_attributes_separate() {
+        let grid = Grid::new(&ANCHOR, 0, 4);
+        let keys = [
+            grid.leaf([1.0; 3], Vec3::Z, 0.1, 1),
+            grid.leaf([1.0; 3], -Vec3::Z, 0.1, 1),
+            grid.leaf([1.0; 3], Vec3::X, 0.1, 1),
+            grid.leaf([1.0; 3], Vec3::Z, 0.1, 2),
+        ];
+        for (i, a) in keys.iter().enumerate() {
+            assert!(a.is_some());
+            assert!(keys[..i].iter().all(|b| a != b));
+        }
+    }
+
+    #[test]
+    fn far_places_have_no_cell() {
+        let grid = Grid::new(&ANCHOR, 0, 4);
+        assert_eq!(grid.leaf([1e9, 0.0, 0.0], Vec3::Z, 1e-6, 0), None);
+    }
+}

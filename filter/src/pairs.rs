@@ -1,0 +1,204 @@
+//! Which slots read which cells, and by how much: what a frame needs to remember of its paths.
+
+use glam::{DVec3, Vec3};
+
+use crate::adaptive::Resolved;
+use crate::sums::Quantum;
+use crate::table::CellIndex;
+
+/// Which estimate a pair reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Lobe {
+    /// That of diffuse lobes.
+    Diffuse,
+    /// That of all others.
+    Glossy,
+}
+
+/// A slot, a cell, and the throughput of all paths between them. 20 bytes.
+///
+/// Throughputs are whole multiples of 2⁻²⁰, so sums are exact in any order; a sum that would overflow begins another pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Pair {
+    /// Slot, and below it the lobe and the tree: [`Pair::label`].
+    slot_lobe_tree: u32,
+    cell: CellIndex,
+    throughput: [i32; 3],
+}
+
+const TREE_BITS: u32 = 3;
+const THROUGHPUT_BITS: i32 = 20;
+
+impl Pair {
+    fn label(slot: u32, lobe: Lobe, tree: u32) -> u32 {
+        slot << (TREE_BITS + 1) | (lobe as u32) << TREE_BITS | tree
+    }
+
+    fn slot(&self) -> u32 {
+        self.slot_lobe_tree >> (TREE_BITS + 1)
+    }
+
+    fn lobe(&self) -> Lobe {
+        if self.slot_lobe_tree >> TREE_BITS & 1 == 0 { Lobe::Diffuse } else { Lobe::Glossy }
+    }
+
+    fn tree(&self) -> u32 {
+        self.slot_lobe_tree & ((1 << TREE_BITS) - 1)
+    }
+
+    fn order(&self) -> u64 {
+        u64::from(self.slot_lobe_tree) << 32 | u64::from(self.cell)
+    }
+
+    /// Adds another pair's throughput, if it fits.
+    fn absorb(&mut self, other: &Self) -> bool {
+        let sum = |i: usize| self.throughput[i].checked_add(other.throughput[i]);
+        let (Some(r), Some(g), Some(b)) = (sum(0), sum(1), sum(2)) else { return false };
+        self.throughput = [r, g, b];
+        true
+    }
+}
+
+/// Sums of one slot that need no cell, in quanta: of 2⁻²⁴ units, up to 2³⁹ of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Own {
+    glossy: [[i64; 3]; 2],
+    unfiltered: [[i64; 3]; 2],
+}
+
+/// All pairs of one part.
+#[derive(Debug, Default)]
+pub struct Pairs {
+    /// Sorted and without repetition up to `compact`, then as they came.
+    pairs: Vec<Pair>,
+    compact: usize,
+    /// Where the current block began: there, cells have the numbers of the part's own tables.
+    block: usize,
+    own: std::collections::BTreeMap<u32, Own>,
+}
+
+impl Pairs {
+    /// A path of `slot` reads `cell` of a tree; false if its throughput does not fit, 2¹¹ or not a number.
+    #[inline]
+    #[must_use]
+    pub fn add(&mut self, slot: u32, lobe: Lobe, tree: u32, cell: CellIndex, throughput: Vec3) -> bool {
+        const SCALE: f32 = (1 << THROUGHPUT_BITS) as f32;
+        // Also false for NaN.
+        if !(throughput.abs().max_element() < (i32::MAX as f32) / SCALE) {
+            return false;
+        }
+        let throughput = (throughput * SCALE).to_array().map(|x| (x + 0.5f32.copysign(x)) as i32);
+        let pair = Pair { slot_lobe_tree: Pair::label(slot, lobe, tree), cell, throughput };
+        // A pixel's samples come one after the other and mostly read one of a few cells.
+        let recent = self.pairs.len().saturating_sub(8).max(self.block);
+        let known = self.pairs[recent..].iter_mut().find(|known| known.order() == pair.order());
+        if !known.is_some_and(|known| known.absorb(&pair)) {
+            self.pairs.push(pair);
+        }
+        true
+    }
+
+    /// Adds what a path brings through glossy lobes.
+    pub fn add_own(&mut self, slot: u32, odd: bool, radiance: Vec3, quantum: &Quantum) {
+        add_quanta(&mut self.own.entry(slot).or_default().glossy[usize::from(odd)], radiance, quantum);
+    }
+
+    /// Adds what a path brings that no cell could take.
+    pub fn add_unfiltered(&mut self, slot: u32, lobe: Lobe, radiance: Vec3, quantum: &Quantum) {
+        add_quanta(&mut self.own.entry(slot).or_default().unfiltered[lobe as usize], radiance, quantum);
+    }
+
+    /// Gives the pairs of the current block that read `tree` the numbers of the large tables.
+    pub fn renumber(&mut self, lobe: Lobe, tree: u32, indices: &[CellIndex]) {
+        for pair in &mut self.pairs[self.block..] {
+            if pair.lobe() == lobe && pair.tree() == tree {
+                pair.cell = indices[pair.cell as usize];
+            }
+        }
+    }
+
+    /// Ends a block.
+    pub fn end_block(&mut self) {
+        // Sorting again only when the list has doubled keeps the work per path constant.
+        if self.pairs.len() >= 2 * self.compact {
+            self.compact();
+        }
+        self.block = self.pairs.len();
+    }
+
+    fn compact(&mut self) {
+        self.pairs.sort_unstable_by_key(Pair::order);
+        self.pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
+        self.compact = self.pairs.len();
+    }
+
+    /// Number of pairs.
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// No pairs.
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.pairs.capacity() * size_of::<Pair>() + self.own.len() * size_of::<(u32, Own)>()
+    }
+
+    /// What every slot gets when `read` tells the estimate of a cell. By slot.
+    pub fn resolve(
+        &mut self,
+        quantum: &Quantum,
+        read: impl Fn(Lobe, usize, CellIndex) -> [f32; 3],
+    ) -> Vec<(u32, Resolved)> {
+        self.compact();
+        self.block = self.pairs.len();
+        let mut slots: std::collections::BTreeMap<u32, [[i128; 3]; 2]> =
+            self.own.keys().map(|&slot| (slot, Default::default())).collect();
+        // Products are rounded one by one and summed as integers: the order of cells within a slot, which depends on who
+        // met them first, does not count.
+        let scale = 2f64.powi(RESOLVED_BITS);
+        for pair in &self.pairs {
+            let estimate = read(pair.lobe(), pair.tree() as usize, pair.cell);
+            let sums = &mut slots.entry(pair.slot()).or_default()[pair.lobe() as usize];
+            for ((sum, throughput), x) in sums.iter_mut().zip(pair.throughput).zip(estimate) {
+                *sum += (f64::from(throughput) * f64::from(x) / quantum.radiance() * scale) as i128;
+            }
+        }
+        let radiance = |sum: [i128; 3]| {
+            let unit = quantum.radiance() / scale * 2f64.powi(-THROUGHPUT_BITS);
+            (DVec3::from_array(sum.map(|x| x as f64)) * unit).as_vec3()
+        };
+        let own_radiance = |sum: [i64; 3]| {
+            (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
+        };
+        slots
+            .into_iter()
+            .map(|(slot, [diffuse, glossy])| {
+                let own = self.own.get(&slot).copied().unwrap_or_default();
+                let resolved = Resolved {
+                    diffuse: radiance(diffuse) + own_radiance(own.unfiltered[0]),
+                    glossy: radiance(glossy) + own_radiance(own.unfiltered[1]),
+                    glossy_own: own.glossy.map(own_radiance),
+                };
+                (slot, resolved)
+            })
+            .collect()
+    }
+}
+
+/// Quanta of the resolved sums per quantum of radiance times throughput, log₂: 2⁻¹⁰ of a rounding that f32 makes anyway.
+const RESOLVED_BITS: i32 = 10;
+
+/// Quanta of a slot's own sums are coarser than those of cells by this power of two.
+const OWN_SHIFT: i32 = 6;
+
+fn add_quanta(sum: &mut [i64; 3], radiance: Vec3, quantum: &Quantum) {
+    let scale = 2f64.powi(-OWN_SHIFT) / quantum.radiance();
+    for (sum, x) in sum.iter_mut().zip(radiance.as_dvec3().to_array()) {
+        // A cast saturates and turns NaN into 0; the renderer rejects such samples before they come here.
+        *sum = sum.saturating_add((x * scale).round() as i64);
+    }
+}

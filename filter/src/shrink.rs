@@ -1,0 +1,185 @@
+//! Noise told from signal: cell means shrunk towards those of the cells around them.
+//!
+//! Every cell is a leaf of a tree of cells, each of twice the side of those it holds. From the coarsest to the finest, the
+//! estimate of a cell is its parent's estimate plus a share w of the difference between their means,
+//!
+//! estimate(child) = estimate(parent) + w (mean(child) − mean(parent)),
+//!
+//! with w = max(0, 1 − τ (k−1) V / S) for k siblings whose means scatter by S = Σ n (mean − mean(parent))², of which noise
+//! alone, of variance V a deposit, would explain (k−1) V. Where the means scatter no more than noise does, w is 0 and the
+//! siblings are pooled; as deposits accumulate S grows with them and w goes to 1: the bias vanishes. The sum over
+//! siblings is kept exactly, so energy is neither lost nor made.
+//!
+//! **Source**: the positive-part estimator of James and Stein \[James61\] on unbalanced Haar details.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::grid::CellKey;
+use crate::sums::{Quantum, WideSums};
+use crate::table::{CellIndex, PerCell, ShardedTable};
+
+/// How sure a difference between cells must be to be kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shrinkage {
+    /// τ: how many times the scatter that noise explains is taken off. 1 is unbiased for V known; more guards against the
+    /// chance that the largest of many differences is noise, and against V measured too small.
+    pub tau: f64,
+    /// Degrees of freedom from which siblings' own scatter of deposits measures V. With fewer the parent's total scatter
+    /// does, which includes the differences in question and so votes for pooling.
+    pub trusted: f64,
+    /// Levels above the coarsest leaf.
+    pub levels: u32,
+}
+
+/// Sums of a cell in floating point; order and grouping are fixed by the order of keys.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    n: f64,
+    rgb: DVec3,
+    square: f64,
+}
+
+impl Moments {
+    fn of(sums: &WideSums, quantum: &Quantum) -> Self {
+        Self {
+            n: (sums.count[0] + sums.count[1]) as f64,
+            rgb: DVec3::from_array(sums.rgb.map(|x| x as f64)) * quantum.radiance(),
+            square: sums.square as f64 * quantum.squared_radiance(),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.n += other.n;
+        self.rgb += other.rgb;
+        self.square += other.square;
+    }
+
+    fn mean(&self) -> DVec3 {
+        self.rgb / self.n
+    }
+
+    /// Mean luminance.
+    fn luminance(&self) -> f64 {
+        self.rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722)) / self.n
+    }
+
+    /// Σ (y − ȳ)².
+    fn scatter(&self) -> f64 {
+        let mean = self.luminance();
+        (self.square - self.n * mean * mean).max(0.0)
+    }
+}
+
+/// A cell of a level, leaf or not.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    key: CellKey,
+    moments: Moments,
+    estimate: DVec3,
+    /// Index of the parent in the next coarser level.
+    parent: u32,
+    /// Where the estimate goes; [`Node::INNER`] for cells that are not leaves.
+    leaf: CellIndex,
+}
+
+impl Node {
+    const INNER: CellIndex = CellIndex::MAX;
+}
+
+/// Estimates for all cells of `table`: radiance.
+pub fn estimate(table: &mut ShardedTable, quantum: &Quantum, shrinkage: &Shrinkage) -> PerCell<[f32; 3]> {
+    let mut estimates = PerCell::new(table);
+    let mut leaves: Vec<Node> = table
+        .cells()
+        .map(|(leaf, key, sums)| {
+            let moments = Moments::of(&sums, quantum);
+            Node { key, moments, estimate: moments.mean(), parent: 0, leaf }
+        })
+        .collect();
+    leaves.par_sort_unstable_by_key(|leaf| leaf.key);
+    let (Some(first), Some(last)) = (leaves.first(), leaves.last()) else { return estimates };
+    let coarsest = last.key.level() + shrinkage.levels as i32;
+
+    // From fine to coarse: each level is the parents of the one before, and the leaves of its own.
+    let mut levels: Vec<Vec<Node>> = Vec::new();
+    let mut inner: Vec<Node> = Vec::new();
+    let mut rest = leaves.as_slice();
+    for level in first.key.level()..=coarsest {
+        let (own, coarser) = rest.split_at(rest.partition_point(|leaf| leaf.key.level() == level));
+        rest = coarser;
+        let mut nodes = merged(&inner, own);
+        inner = parents(&mut nodes);
+        levels.push(nodes);
+    }
+
+    // From coarse to fine.
+    for level in (0..levels.len() - 1).rev() {
+        let (fine, coarse) = levels.split_at_mut(level + 1);
+        for siblings in fine[level].chunk_by_mut(|a, b| a.parent == b.parent) {
+            shrink(siblings, &coarse[0][siblings[0].parent as usize], shrinkage);
+        }
+    }
+    for node in levels.iter().flatten().filter(|node| node.leaf != Node::INNER) {
+        estimates.set(node.leaf, node.estimate.as_vec3().to_array());
+    }
+    estimates
+}
+
+/// Two sorted lists as one. A cell may be in both: some of its deposits were finer than others, and the two are siblings.
+fn merged(inner: &[Node], leaves: &[Node]) -> Vec<Node> {
+    let mut nodes = Vec::with_capacity(inner.len() + leaves.len());
+    let mut leaves = leaves.iter().peekable();
+    for node in inner {
+        while let Some(leaf) = leaves.next_if(|leaf| leaf.key < node.key) {
+            nodes.push(*leaf);
+        }
+        nodes.push(*node);
+    }
+    nodes.extend(leaves);
+    nodes
+}
+
+/// The parents of a level's cells, in order.
+fn parents(nodes: &mut [Node]) -> Vec<Node> {
+    let mut parents: Vec<Node> = Vec::with_capacity(nodes.len() / 2);
+    for node in nodes {
+        let key = node.key.parent();
+        match parents.last_mut() {
+            Some(parent) if parent.key == key => parent.moments.add(&node.moments),
+            _ => parents.push(Node { key, leaf: Node::INNER, ..*node }),
+        }
+        node.parent = parents.len() as u32 - 1;
+    }
+    for parent in &mut parents {
+        parent.estimate = parent.moments.mean();
+    }
+    parents
+}
+
+/// Sets the estimates of all children of `parent`.
+fn shrink(siblings: &mut [Node], parent: &Node, shrinkage: &Shrinkage) {
+    let weight = kept(siblings, &parent.moments, shrinkage);
+    let mean = parent.moments.mean();
+    for child in siblings {
+        child.estimate = parent.estimate + weight * (child.moments.mean() - mean);
+    }
+}
+
+/// The share w of the siblings' differences that is kept.
+fn kept(siblings: &[Node], parent: &Moments, shrinkage: &Shrinkage) -> f64 {
+    if siblings.len() == 1 {
+        return 0.0;
+    }
+    let mean = parent.luminance();
+    let (mut within, mut between) = (0.0, 0.0);
+    for Node { moments, .. } in siblings {
+        let difference = moments.luminance() - mean;
+        within += moments.scatter();
+        between += moments.n * difference * difference;
+    }
+    let freedom = parent.n - siblings.len() as f64;
+    let variance = if freedom >= shrinkage.trusted { within / freedom } else { parent.scatter() / (parent.n - 1.0) };
+    let noise = shrinkage.tau * (siblings.len() - 1) as f64 * variance;
+    if between > noise { 1.0 - noise / between } else { 0.0 }
+}

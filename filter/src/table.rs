@@ -1,0 +1,260 @@
+//! Cells by their keys.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use crate::grid::CellKey;
+use crate::sums::{Deposit, Sums, WideSums};
+
+/// A cell: 64 bytes, a cache line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cell {
+    key: CellKey,
+    sums: Sums,
+}
+
+/// Cells found by key: open addressing with linear probing over full keys. It grows, so no cell is ever refused, and
+/// nothing depends on who came first but the cells' numbers, which no result may depend on.
+#[derive(Debug, Default)]
+pub struct Table {
+    /// Number of the cell plus one, 0 for none; a power of two of slots, at most half of them taken.
+    slots: Vec<u32>,
+    cells: Vec<Cell>,
+    /// What did not fit into cells, by their numbers.
+    wide: BTreeMap<u32, WideSums>,
+}
+
+impl Table {
+    /// Number of the cell of `key`, which is made if there is none.
+    #[inline]
+    pub fn cell(&mut self, key: CellKey) -> u32 {
+        if 2 * self.cells.len() >= self.slots.len() {
+            self.grow();
+        }
+        let mask = self.slots.len() - 1;
+        let mut at = key.hash() as usize & mask;
+        loop {
+            match self.slots[at] {
+                0 => break,
+                number if self.cells[number as usize - 1].key == key => return number - 1,
+                _ => at = (at + 1) & mask,
+            }
+        }
+        self.cells.push(Cell { key, sums: Sums::default() });
+        self.slots[at] = self.cells.len() as u32;
+        self.cells.len() as u32 - 1
+    }
+
+    #[cold]
+    fn grow(&mut self) {
+        let length = (2 * self.slots.len()).max(64);
+        self.slots = vec![0; length];
+        for (cell, number) in self.cells.iter().zip(1..) {
+            let mut at = cell.key.hash() as usize & (length - 1);
+            while self.slots[at] != 0 {
+                at = (at + 1) & (length - 1);
+            }
+            self.slots[at] = number;
+        }
+    }
+
+    /// Adds a deposit to a cell.
+    #[inline]
+    pub fn add(&mut self, cell: u32, deposit: &Deposit) {
+        if !self.cells[cell as usize].sums.add(deposit) {
+            self.widen(cell).add(deposit);
+        }
+    }
+
+    /// Adds sums to a cell.
+    #[inline]
+    pub fn merge(&mut self, cell: u32, sums: &Sums) {
+        if !self.cells[cell as usize].sums.merge(sums) {
+            self.widen(cell).merge(&sums.into());
+        }
+    }
+
+    /// Adds sums of any size to a cell.
+    pub fn merge_wide(&mut self, cell: u32, sums: &WideSums) {
+        self.wide.entry(cell).or_default().merge(sums);
+    }
+
+    /// Moves a cell's sums to its wide ones, and returns those.
+    #[cold]
+    fn widen(&mut self, cell: u32) -> &mut WideSums {
+        let sums = std::mem::take(&mut self.cells[cell as usize].sums);
+        let wide = self.wide.entry(cell).or_default();
+        wide.merge(&(&sums).into());
+        wide
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// No cells.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// All cells with their sums, in the order of their numbers.
+    pub fn cells(&self) -> impl Iterator<Item = (CellKey, WideSums)> + '_ {
+        self.cells.iter().zip(0u32..).map(|(cell, number)| {
+            let mut sums = WideSums::from(&cell.sums);
+            if let Some(wide) = self.wide.get(&number) {
+                sums.merge(wide);
+            }
+            (cell.key, sums)
+        })
+    }
+
+    /// Forgets all cells, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.slots.fill(0);
+        self.cells.clear();
+        self.wide.clear();
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.slots.capacity() * size_of::<u32>() + self.cells.capacity() * size_of::<Cell>()
+    }
+}
+
+/// A table that threads add to at once: shards by the upper bits of the hash, each behind a lock that is held for a batch.
+#[derive(Debug)]
+pub struct ShardedTable {
+    shards: Vec<Mutex<Table>>,
+}
+
+/// Where a cell is: shard in the lower bits, number above.
+pub type CellIndex = u32;
+
+const SHARD_BITS: u32 = 6;
+
+/// Number of shards: enough that a few dozen threads seldom meet, few enough that a batch per shard is worth a lock.
+pub const SHARDS: usize = 1 << SHARD_BITS;
+
+#[inline]
+fn shard_of(key: CellKey) -> usize {
+    (key.hash() >> (64 - SHARD_BITS)) as usize
+}
+
+#[inline]
+fn place(shard: usize, number: u32) -> CellIndex {
+    assert!(number >> (32 - SHARD_BITS) == 0, "too many cells: the frame is too large for the filter");
+    number << SHARD_BITS | shard as u32
+}
+
+impl Default for ShardedTable {
+    fn default() -> Self {
+        Self { shards: (0..SHARDS).map(|_| Mutex::default()).collect() }
+    }
+}
+
+impl ShardedTable {
+    /// Adds deposits to the cells of their keys. The cell of entry (key, deposit, i) is then at `places[i]`.
+    ///
+    /// # Panics
+    /// As [`Self::merge`].
+    pub fn add(&self, batch: &mut [(CellKey, Deposit, u32)], places: &mut [CellIndex]) {
+        batch.sort_unstable_by_key(|(key, _, at)| (shard_of(*key), *at));
+        for batch in batch.chunk_by(|(a, ..), (b, ..)| shard_of(*a) == shard_of(*b)) {
+            let shard = shard_of(batch[0].0);
+            let mut table = self.lock(shard);
+            for (key, deposit, at) in batch {
+                let number = table.cell(*key);
+                table.add(number, deposit);
+                places[*at as usize] = place(shard, number);
+            }
+        }
+    }
+
+    fn lock(&self, shard: usize) -> std::sync::MutexGuard<'_, Table> {
+        self.shards[shard].lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// Adds all cells of `local`, whose cell i is then at `indices[i]` here.
+    ///
+    /// # Panics
+    /// If a shard comes to hold 2²⁶ cells, 4 GiB.
+    pub fn merge(&self, local: &Table, indices: &mut Vec<CellIndex>) {
+        let mut by_shard: Vec<u32> = (0..local.cells.len() as u32).collect();
+        by_shard.sort_unstable_by_key(|&cell| shard_of(local.cells[cell as usize].key));
+        indices.clear();
+        indices.resize(local.cells.len(), 0);
+        for batch in
+            by_shard.chunk_by(|&a, &b| shard_of(local.cells[a as usize].key) == shard_of(local.cells[b as usize].key))
+        {
+            let shard = shard_of(local.cells[batch[0] as usize].key);
+            let mut table = self.lock(shard);
+            for &cell in batch {
+                let Cell { key, sums } = &local.cells[cell as usize];
+                let number = table.cell(*key);
+                table.merge(number, sums);
+                if let Some(wide) = local.wide.get(&cell) {
+                    table.merge_wide(number, wide);
+                }
+                indices[cell as usize] = place(shard, number);
+            }
+        }
+    }
+
+    /// All cells with their sums and places, by shard.
+    pub fn cells(&mut self) -> impl Iterator<Item = (CellIndex, CellKey, WideSums)> + '_ {
+        self.shards.iter_mut().zip(0u32..).flat_map(|(shard, at)| {
+            let table = shard.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner);
+            table.cells().zip(0u32..).map(move |((key, sums), number)| (number << SHARD_BITS | at, key, sums))
+        })
+    }
+
+    /// Number of cells.
+    pub fn len(&mut self) -> usize {
+        self.tables().map(|table| table.len()).sum()
+    }
+
+    /// No cells.
+    pub fn is_empty(&mut self) -> bool {
+        self.len() == 0
+    }
+
+    /// Forgets all cells, and keeps the memory.
+    pub fn clear(&mut self) {
+        self.tables().for_each(Table::clear);
+    }
+
+    /// Bytes held.
+    pub fn bytes(&mut self) -> usize {
+        self.tables().map(|table| table.bytes()).sum()
+    }
+
+    fn tables(&mut self) -> impl Iterator<Item = &mut Table> {
+        self.shards.iter_mut().map(|shard| shard.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+}
+
+/// A value per cell of a [`ShardedTable`].
+#[derive(Debug, Default)]
+pub struct PerCell<T> {
+    shards: Vec<Vec<T>>,
+}
+
+impl<T: Copy + Default> PerCell<T> {
+    /// Default values for all cells of `table`.
+    pub fn new(table: &mut ShardedTable) -> Self {
+        Self { shards: table.tables().map(|table| vec![T::default(); table.len()]).collect() }
+    }
+
+    /// The value at a place.
+    #[inline]
+    pub fn get(&self, index: CellIndex) -> T {
+        self.shards[index as usize % SHARDS][index as usize / SHARDS]
+    }
+
+    /// Sets the value at a place.
+    #[inline]
+    pub fn set(&mut self, index: CellIndex, value: T) {
+        self.shards[index as usize % SHARDS][index as usize / SHARDS] = value;
+    }
+}
