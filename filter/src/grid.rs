@@ -99,25 +99,28 @@ pub struct Grid {
     /// World position of the corner of all cells.
     corner: DVec3,
     inverse_scale: f64,
+    /// Finest level of which the scene is no more than 2²⁰ cells wide, so that all of it has cells.
+    finest: i32,
 }
 
 impl Grid {
     /// Tree `index` of `count`.
     pub fn new(anchor: &Anchor, index: u32, count: u32) -> Self {
-        // Far above the largest cells, so that every level's borders are shifted at random; a power of two, so that a
-        // scene scaled by one keeps its cells.
-        let reach = 2f64.powi(exponent_of(anchor.extent) + 2);
+        // Above the largest cells, so that every level's borders are shifted at random; a power of two, so that a scene
+        // scaled by one keeps its cells.
+        let reach = 2f64.powi(exponent_of(anchor.extent) - 2);
         let random = |axis: u64| (mix64(u64::from(index) << 2 | axis) >> 11) as f64 / (1u64 << 53) as f64;
         let shift = DVec3::new(random(0), random(1), random(2)) * reach;
         let scale = 2f64.powf(f64::from(index) / f64::from(count));
-        Self { corner: anchor.origin - shift, inverse_scale: scale.recip() }
+        let finest = exponent_of(anchor.extent) + 3 - COORDINATE_BITS as i32;
+        Self { corner: anchor.origin - shift, inverse_scale: scale.recip(), finest }
     }
 
     /// The finest cell for a vertex at `p` that faces `n`, at least `side` / 2 and less than `side` wide before the tree's
-    /// scale. `attributes`: 45 bits that vertices must agree in to meet. `None` if the place is too far for its footprint.
+    /// scale, unless that is less than 2⁻¹⁸ of the extent. `attributes`: 45 bits that vertices must agree in to meet. `None` for a place outside the extent.
     #[inline]
     pub fn leaf(&self, p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Option<CellKey> {
-        let level = exponent_of(f64::from(side)) - 1;
+        let level = (exponent_of(f64::from(side)) - 1).max(self.finest);
         let position = (Vec3::from_array(p).as_dvec3() - self.corner) * self.inverse_scale * power_of_two(-level);
         CellKey::new(level, attributes << 3 | u64::from(facing(n)), position)
     }
@@ -206,8 +209,11 @@ mod tests {
     }
 
     #[test]
-    fn far_places_have_no_cell() {
+    fn far_places_have_no_cell_and_all_of_the_scene_has_one() {
         let grid = Grid::new(&ANCHOR, 0, 4);
         assert_eq!(grid.leaf([1e9, 0.0, 0.0], Vec3::Z, 1e-6, 0), None);
+        for side in [1e-30, 1e-6, 1.0] {
+            assert!(grid.leaf([23.0, -22.0, 27.0], Vec3::Z, side, 0).is_some());
+        }
     }
 }

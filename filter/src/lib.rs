@@ -14,5 +14,5 @@ mod table;
 pub use adaptive::{Adaptive, Params, Report, Resolved};
 pub use grid::Anchor;
 pub use packed::{PackedFootprint, PackedNormal, PackedRgb};
-pub use record::{Lobe, PathRecord, Vertex};
+pub use record::{Lobe, PathRecord, Vertex, direction_bin};
 pub use shrink::Shrinkage;

@@ -1,8 +1,8 @@
 //! The boundary: what a renderer says of a path.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use crate::packed::{PackedFootprint, PackedNormal, PackedRgb};
+use crate::packed::{PackedFootprint, PackedNormal, PackedRgb, octahedral};
 
 /// A vertex that other paths' vertices may be near to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,6 +55,12 @@ impl Vertex {
     pub fn bin(&self) -> u8 {
         (self.surface_and_bin >> 24) as u8
     }
+}
+
+/// Which of 16 parts of the sphere a unit direction points to: equal squares of its octahedral map.
+pub fn direction_bin(direction: Vec3) -> u8 {
+    let p = (octahedral(direction) * 2.0 + 2.0).clamp(Vec2::ZERO, Vec2::splat(3.0));
+    p.x as u8 | (p.y as u8) << 2
 }
 
 /// The part of a path that passes through one lobe of its first vertex.
@@ -122,6 +128,11 @@ impl PathRecord {
     /// Number of the path's sample within its slot, modulo 256.
     pub fn sample(&self) -> u8 {
         self.second.bin()
+    }
+
+    /// Sets [`Self::sample`].
+    pub fn set_sample(&mut self, sample: u8) {
+        self.second.surface_and_bin = self.second.surface() | u32::from(sample) << 24;
     }
 
     /// Whether the sample is an odd one: even and odd samples are two independent halves of a slot.

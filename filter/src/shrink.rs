@@ -77,8 +77,6 @@ struct Node {
     key: CellKey,
     moments: Moments,
     estimate: DVec3,
-    /// Index of the parent in the next coarser level.
-    parent: u32,
     /// Where the estimate goes; [`Node::INNER`] for cells that are not leaves.
     leaf: CellIndex,
 }
@@ -94,7 +92,7 @@ pub fn estimate(table: &mut ShardedTable, quantum: &Quantum, shrinkage: &Shrinka
         .cells()
         .map(|(leaf, key, sums)| {
             let moments = Moments::of(&sums, quantum);
-            Node { key, moments, estimate: moments.mean(), parent: 0, leaf }
+            Node { key, moments, estimate: moments.mean(), leaf }
         })
         .collect();
     leaves.par_sort_unstable_by_key(|leaf| leaf.key);
@@ -108,16 +106,18 @@ pub fn estimate(table: &mut ShardedTable, quantum: &Quantum, shrinkage: &Shrinka
     for level in first.key.level()..=coarsest {
         let (own, coarser) = rest.split_at(rest.partition_point(|leaf| leaf.key.level() == level));
         rest = coarser;
-        let mut nodes = merged(&inner, own);
-        inner = parents(&mut nodes);
+        let nodes = merged(&inner, own);
+        inner = parents(&nodes);
         levels.push(nodes);
     }
 
     // From coarse to fine.
     for level in (0..levels.len() - 1).rev() {
         let (fine, coarse) = levels.split_at_mut(level + 1);
-        for siblings in fine[level].chunk_by_mut(|a, b| a.parent == b.parent) {
-            shrink(siblings, &coarse[0][siblings[0].parent as usize], shrinkage);
+        // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
+        let parents = coarse[0].iter().filter(|node| node.leaf == Node::INNER);
+        for (siblings, parent) in fine[level].chunk_by_mut(|a, b| a.key.parent() == b.key.parent()).zip(parents) {
+            shrink(siblings, parent, shrinkage);
         }
     }
     for node in levels.iter().flatten().filter(|node| node.leaf != Node::INNER) {
@@ -141,7 +141,7 @@ fn merged(inner: &[Node], leaves: &[Node]) -> Vec<Node> {
 }
 
 /// The parents of a level's cells, in order.
-fn parents(nodes: &mut [Node]) -> Vec<Node> {
+fn parents(nodes: &[Node]) -> Vec<Node> {
     let mut parents: Vec<Node> = Vec::with_capacity(nodes.len() / 2);
     for node in nodes {
         let key = node.key.parent();
@@ -149,7 +149,6 @@ fn parents(nodes: &mut [Node]) -> Vec<Node> {
             Some(parent) if parent.key == key => parent.moments.add(&node.moments),
             _ => parents.push(Node { key, leaf: Node::INNER, ..*node }),
         }
-        node.parent = parents.len() as u32 - 1;
     }
     for parent in &mut parents {
         parent.estimate = parent.moments.mean();

@@ -35,4 +35,5 @@ pub mod world;
 pub mod compile;
 pub mod integrator;
 pub mod film;
+pub mod filtering;
 pub mod render;

@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::compile::{self, CompileError};
-use crate::film::{AovSet, Film, Tile};
-use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries};
+use crate::film::{AovSet, Film, Tile, TilePixel};
+use crate::filtering::{Filtering, FrameFilter, Keep, Keeper, Nothing, Paths};
+use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
 use crate::world::{Techniques, World};
@@ -39,6 +40,8 @@ pub struct Job {
     pub time_limit: Option<Duration>,
     /// How lights are found: a diagnostic.
     pub techniques: Techniques,
+    /// How the frame is filtered.
+    pub filtering: Filtering,
 }
 
 /// What a job is doing.
@@ -165,6 +168,10 @@ pub struct Statistics {
     pub primitives: u64,
     /// Of those, the ones in memory.
     pub unique_primitives: u64,
+    /// Seconds of filtering, of those of rendering.
+    pub filter_seconds: f64,
+    /// What the filter did.
+    pub filter: Option<filter::Report>,
 }
 
 /// A scene that is read and built, with what of the job it decides.
@@ -175,6 +182,8 @@ pub struct Prepared {
     pub description: FrameDescription,
     /// Auxiliary outputs of the job and of the file.
     pub aovs: AovSet,
+    /// How the frame is filtered.
+    pub filtering: Filtering,
     /// Seconds so far.
     pub statistics: Statistics,
     /// Owns the BVH's memory.
@@ -246,35 +255,74 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         ndc_from_world: world.camera.ndc_from_world(),
         filename: description.film.filename.clone(),
     };
-    Ok(Prepared { world, description, aovs, statistics, device })
+    Ok(Prepared { world, description, aovs, filtering: job.filtering, statistics, device })
 }
 
 /// Traces all passes of a prepared job.
 pub fn trace(prepared: Prepared, time_limit: Option<Duration>, observer: &dyn Observer) -> Frame {
-    let Prepared { world, mut description, aovs, mut statistics, .. } = prepared;
     observer.phase(Phase::Render);
     let start = Instant::now();
-    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, aovs);
-    statistics.film_bytes = Film::memory(film.bounds(), aovs);
+    let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
+    let mut frame = match prepared.world.geometry.alpha_test(&prepared.world.textures) {
+        None => trace_queries(&prepared, &Opaque(prepared.world.geometry.scene()), observer, &over),
+        Some(alpha) => {
+            let queries = AlphaTested { scene: prepared.world.geometry.scene(), alpha };
+            trace_queries(&prepared, &queries, observer, &over)
+        }
+    };
+    frame.statistics.render_seconds = start.elapsed().as_secs_f64();
+    frame
+}
+
+/// Traces all passes, filtered or not.
+fn trace_queries<Q: Queries + Sync>(
+    prepared: &Prepared,
+    queries: &Q,
+    observer: &dyn Observer,
+    over: &dyn Fn() -> bool,
+) -> Frame {
+    let Prepared { world, description, aovs, filtering, statistics, .. } = prepared;
+    let (mut description, mut statistics) = (description.clone(), statistics.clone());
+    let film = Film::new(world.sensor.resolution, world.sensor.bounds, *aovs);
+    statistics.film_bytes = Film::memory(film.bounds(), *aovs);
     let asked = description.sample_range_asked.clone();
     let progress = Progress::new(&film, &asked, observer);
-    for pass in passes(&asked) {
-        statistics.counters += match world.geometry.alpha_test(&world.textures) {
-            None => trace_pass(&world, &Opaque(world.geometry.scene()), &mut film, &pass, description.seed, &progress),
-            Some(alpha) => {
-                let queries = AlphaTested { scene: world.geometry.scene(), alpha };
-                trace_pass(&world, &queries, &mut film, &pass, description.seed, &progress)
-            }
-        };
+    let mut passes = Passes { world, queries, sampler: Sampler::new(description.seed), film, progress };
+    let mut done = |pass: &Range<u64>, counters: Counters| {
+        statistics.counters += counters;
         statistics.passes += 1;
         description.sample_range.end = pass.end;
-        let over = time_limit.is_some_and(|limit| start.elapsed() >= limit);
-        if over || observer.stop_requested() {
-            break;
+        over()
+    };
+    match filtering {
+        Filtering::None => {
+            for pass in self::passes(&asked) {
+                let (counters, _) = passes.trace::<Nothing>(&pass);
+                if done(&pass, counters) {
+                    break;
+                }
+            }
+        }
+        Filtering::Adaptive(params) => {
+            let unit = passes.unit();
+            passes.film = passes.film.with_split();
+            let mut filter = FrameFilter::new(params, world, &mut passes.film, unit);
+            let mut seconds = 0.0;
+            for pass in filter.blocks(&asked) {
+                let (counters, paths) = passes.trace::<Paths>(&pass);
+                let start = Instant::now();
+                filter.add(&paths.into_iter().map(|paths| paths.0).collect::<Vec<_>>());
+                seconds += start.elapsed().as_secs_f64();
+                if done(&pass, counters) {
+                    break;
+                }
+            }
+            let start = Instant::now();
+            statistics.filter = Some(filter.finish(world, &mut passes.film));
+            statistics.filter_seconds = seconds + start.elapsed().as_secs_f64();
         }
     }
-    statistics.render_seconds = start.elapsed().as_secs_f64();
-    Frame { film, description, statistics }
+    Frame { film: passes.film, description, statistics }
 }
 
 /// Cuts a range of samples into passes over the whole frame: short ones first, so that a job that is stopped early has
@@ -292,57 +340,101 @@ pub fn passes(range: &Range<u64>) -> impl Iterator<Item = Range<u64>> + use<> {
 /// The longest pass, in samples per pixel.
 const PASS_SPP: u64 = 16;
 
-/// Traces samples `pass` of every pixel into `film`.
-fn trace_pass<Q: Queries + Sync>(
-    world: &World,
-    queries: &Q,
-    film: &mut Film,
-    pass: &Range<u64>,
-    seed: u64,
-    progress: &Progress<'_>,
-) -> Counters {
-    let sampler = Sampler::new(seed);
-    let first_hit = film.aovs().first_hit();
-    let mut tiles = film.tiles();
-    let counters = tiles.par_iter_mut().map(|tile| {
-        let counters = trace_tile(world, queries, tile, pass, &sampler, first_hit);
-        progress.add(counters.camera_rays);
-        counters
-    });
-    counters.reduce(Counters::default, |mut sum, counters| {
-        sum += counters;
-        sum
-    })
+/// All that a pass over the frame needs.
+struct Passes<'a, Q> {
+    world: &'a World,
+    queries: &'a Q,
+    sampler: Sampler,
+    film: Film,
+    progress: Progress<'a>,
 }
 
+impl<Q: Queries + Sync> Passes<'_, Q> {
+    /// Traces samples `pass` of every pixel; what was kept of them, by tile.
+    fn trace<K: Keeper>(&mut self, pass: &Range<u64>) -> (Counters, Vec<K>) {
+        let first_hit = self.film.aovs().first_hit();
+        let mut tiles = self.film.tiles();
+        let traced: Vec<(Counters, K)> = tiles
+            .par_iter_mut()
+            .map(|tile| {
+                let mut keeper = K::default();
+                let counters = trace_tile(self.world, self.queries, tile, pass, &self.sampler, first_hit, &mut keeper);
+                self.progress.add(counters.camera_rays);
+                (counters, keeper)
+            })
+            .collect();
+        let mut sum = Counters::default();
+        let kept = traced.into_iter().map(|(counters, keeper)| {
+            sum += counters;
+            keeper
+        });
+        let kept = kept.collect();
+        (sum, kept)
+    }
+
+    /// Radiance of the order of the frame's mean, from a few paths all over it: the same for every part of the frame's
+    /// samples.
+    fn unit(&self) -> f32 {
+        let [width, height] = self.world.sensor.resolution;
+        let (mut sum, mut lit) = (0.0, 0.0);
+        for k in 0..PILOT_PATHS {
+            // Rows and columns by two numbers without common structure.
+            let at = self.sampler.pixel_sample([0, 0], k).d2(Dimension::FILM);
+            let pixel = [(at.x * width as f32) as u32, (at.y * height as f32) as u32];
+            let numbers = self.sampler.pixel_sample(pixel, u64::MAX - k);
+            let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
+            let Some(camera) = self.world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
+            let counters = &mut Counters::default();
+            let sample =
+                integrator::trace(self.world, self.queries, &camera, &numbers, false, &mut Unrecorded, counters);
+            let radiance = f64::from(sample.radiance.element_sum() / 3.0);
+            if radiance > 0.0 && radiance.is_finite() {
+                sum += radiance;
+                lit += 1.0;
+            }
+        }
+        if lit > 0.0 { (sum / lit) as f32 } else { 1.0 }
+    }
+}
+
+/// Paths that find the order of the frame's radiance, of which a power of two matters.
+const PILOT_PATHS: u64 = 512;
+
 /// Traces samples `pass` of every pixel of one tile.
-pub fn trace_tile<Q: Queries>(
+pub fn trace_tile<Q: Queries, K: Keeper>(
     world: &World,
     queries: &Q,
     tile: &mut Tile<'_>,
     pass: &Range<u64>,
     sampler: &Sampler,
     first_hit: bool,
+    keeper: &mut K,
 ) -> Counters {
     let mut counters = Counters::default();
-    tile.for_each(|[x, y], pixel, mut auxiliary| {
+    tile.for_each(|TilePixel { at: [x, y], index: slot, pixel, mut auxiliary, mut split }| {
         for index in pass.clone() {
             let numbers = sampler.pixel_sample([x, y], index);
             let offset = world.filter.sample(numbers.d2(Dimension::FILM));
             let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
-            let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else {
-                pixel.add(glam::Vec3::ZERO, 0.0, offset.weight);
+            let mut recorder = K::Recorder::default();
+            let camera = world.camera.ray(film_point, numbers.d2(Dimension::LENS));
+            let mut sample = camera.map_or_else(Sample::default, |camera| {
+                integrator::trace(world, queries, &camera, &numbers, first_hit, &mut recorder, &mut counters)
+            });
+            if camera.is_none() {
                 counters.camera_rays += 1;
-                continue;
-            };
-            let sample = integrator::trace(world, queries, &camera, &numbers, first_hit, &mut counters);
-            let mut radiance = world.sensor.expose(sample.radiance);
+            }
+            let (mut radiance, mut exposure) = world.sensor.expose(sample.radiance);
             // A sensor's response may leave its gamut: negative is rejected only as radiance.
             if !radiance.is_finite() || sample.radiance.min_element() < 0.0 {
                 counters.rejected_samples += 1;
-                radiance = glam::Vec3::ZERO;
+                (radiance, exposure) = (glam::Vec3::ZERO, 0.0);
+                recorder = K::Recorder::default();
+                sample.radiance = radiance;
             }
             pixel.add(radiance, sample.alpha, offset.weight);
+            let split = split.as_deref_mut();
+            keeper.keep(&recorder, Keep { slot, index, radiance, weight: offset.weight, exposure, split });
             if let Some(auxiliary) = auxiliary.as_deref_mut().filter(|_| sample.alpha > 0.0) {
                 auxiliary.add(&sample.first);
             }

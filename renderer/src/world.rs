@@ -69,6 +69,12 @@ impl Bounds {
         self.max[1] - self.min[1]
     }
 
+    /// All pixels, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = [u32; 2]> + use<> {
+        let Self { min, max } = *self;
+        (min[1]..max[1]).flat_map(move |y| (min[0]..max[0]).map(move |x| [x, y]))
+    }
+
     /// Number of pixels.
     pub fn area(&self) -> u64 {
         u64::from(self.width()) * u64::from(self.height())
@@ -89,11 +95,12 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// Film RGB of a sample's radiance.
-    pub fn expose(&self, radiance: Rgb) -> Rgb {
+    /// Film RGB of a sample's radiance, and the share of it that the sensor takes: less than 1 only if it clamps.
+    pub fn expose(&self, radiance: Rgb) -> (Rgb, f32) {
         let exposed = self.response * radiance;
         let largest = exposed.max_element();
-        if largest > self.max_component { exposed * (self.max_component / largest) } else { exposed }
+        let share = if largest > self.max_component { self.max_component / largest } else { 1.0 };
+        (exposed * share, share)
     }
 }
 

@@ -125,6 +125,18 @@ impl<'w> CoatedDiffuse<'w> {
         (pdf > 0.0).then(|| BsdfSample::reflection(wi, value / pdf, pdf))
     }
 
+    /// The base through the coat on the way out.
+    #[inline]
+    pub(super) fn diffuse_albedo(&self, wo: LocalDir) -> Rgb {
+        self.base * self.coat.reflected_and_transmitted(wo.abs_cos_theta()).1
+    }
+
+    /// The coat's transmittance on the way in, times |cosθᵢ|/π.
+    #[inline]
+    pub(super) fn diffuse(&self, wi: LocalDir) -> f32 {
+        self.coat.transmitted(wi.abs_cos_theta()) * wi.abs_cos_theta() * FRAC_1_PI
+    }
+
     pub(super) fn albedo(&self, wo: LocalDir) -> Rgb {
         let (coat, transmitted) = self.coat.reflected_and_transmitted(wo.abs_cos_theta());
         self.base * (transmitted * self.coat.mean_transmitted()) + coat

@@ -147,6 +147,32 @@ impl Bsdf<'_> {
         }
     }
 
+    /// The part that a [`Self::diffuse`] lobe reflects, but for light's way in: the diffuse share of [`Self::eval`] is
+    /// this times that. Holds all of the texture and all that depends on `wo`; zero where there is no such lobe.
+    #[inline]
+    pub fn diffuse_albedo(&self, wo: LocalDir) -> Rgb {
+        match self {
+            Self::Diffuse(b) => b.albedo,
+            Self::DiffuseTransmission(b) => b.reflectance,
+            Self::CoatedDiffuse(b) => b.diffuse_albedo(wo),
+            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::CoatedConductor(_) => Rgb::ZERO,
+        }
+    }
+
+    /// How much of the light from `wi` arrives in the diffuse lobe, times |cosθᵢ|/π, sr⁻¹. The same for all `wo` on the
+    /// side of `wi`, zero for those on the other.
+    #[inline]
+    pub fn diffuse(&self, wo: LocalDir, wi: LocalDir) -> f32 {
+        if !wo.same_hemisphere(wi) {
+            return 0.0;
+        }
+        match self {
+            Self::Diffuse(_) | Self::DiffuseTransmission(_) => wi.abs_cos_theta() * std::f32::consts::FRAC_1_PI,
+            Self::CoatedDiffuse(b) => b.diffuse(wi),
+            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::CoatedConductor(_) => 0.0,
+        }
+    }
+
     /// Fraction of uniform light from all around that leaves towards `wo`, for the albedo channel: masking losses of rough
     /// metals and glass are left out.
     pub fn albedo(&self, wo: LocalDir) -> Rgb {

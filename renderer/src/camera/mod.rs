@@ -84,6 +84,11 @@ struct Lens {
 }
 
 impl Camera {
+    /// Where the camera is, world space.
+    pub fn position(&self) -> Vec3 {
+        self.world_from_camera.translation.into()
+    }
+
     /// The camera that a description means, for a frame of `resolution` pixels.
     ///
     /// **Errors**: parameters that yield no image, such as an angle of view of 180° or a singular transform.

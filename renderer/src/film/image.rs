@@ -1,6 +1,6 @@
 //! The image that a film shows.
 
-use super::{Film, Pixel};
+use super::Film;
 use crate::math::Rgb;
 
 /// One channel of an image.
@@ -29,11 +29,9 @@ impl Film {
         let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0 };
         let bounds = self.bounds();
         image.values.reserve_exact(bounds.area() as usize * image.channels.len());
-        for y in bounds.min[1]..bounds.max[1] {
-            for x in bounds.min[0]..bounds.max[0] {
-                image.push_radiance(self.pixel([x, y]));
-                self.push_auxiliary([x, y], &mut image.values);
-            }
+        for at in bounds.pixels() {
+            image.push_radiance(self.value(at), self.pixel(at).mean_alpha());
+            self.push_auxiliary(at, &mut image.values);
         }
         image
     }
@@ -87,24 +85,24 @@ impl Film {
 }
 
 impl Image {
-    fn push_radiance(&mut self, pixel: &Pixel) {
-        let mean = pixel.mean().as_vec3();
-        self.clamped_negative += u64::from(mean.min_element() < 0.0);
-        self.values.extend(mean.max(Rgb::ZERO).to_array());
-        self.values.push((pixel.mean_alpha() as f32).clamp(0.0, 1.0));
+    fn push_radiance(&mut self, radiance: glam::DVec3, alpha: f64) {
+        let radiance = radiance.as_vec3();
+        self.clamped_negative += u64::from(radiance.min_element() < 0.0);
+        self.values.extend(radiance.max(Rgb::ZERO).to_array());
+        self.values.push((alpha as f32).clamp(0.0, 1.0));
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::AovSet;
+    use super::super::{AovSet, TilePixel};
     use super::*;
     use crate::world::Bounds;
 
     #[test]
     fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {
         let mut film = Film::new([3, 2], Bounds::full([3, 2]), AovSet::all());
-        film.tiles()[0].for_each(|_, pixel, _| {
+        film.tiles()[0].for_each(|TilePixel { pixel, .. }| {
             pixel.add(Rgb::new(2.0, 1.0e9, 0.0), 1.0, 1.0);
             pixel.add(Rgb::new(6.0, 0.0, 0.0), 1.0, -0.5);
         });

@@ -8,7 +8,7 @@ mod image;
 mod pixel;
 
 pub use image::{Channel, Image};
-pub use pixel::{Auxiliary, Pixel};
+pub use pixel::{Auxiliary, Pixel, Split};
 
 use crate::math::Rgb;
 use crate::world::Bounds;
@@ -82,6 +82,10 @@ pub struct Film {
     pixels: Vec<Pixel>,
     /// In the same order; empty unless [`AovSet::first_hit`].
     auxiliary: Vec<Auxiliary>,
+    /// In the same order; empty unless the frame is filtered.
+    split: Vec<Split>,
+    /// In the same order: what the filter makes of the pixels, film RGB. Empty until then.
+    filtered: Vec<Rgb>,
 }
 
 /// One tile of a film, exclusively held by a thread.
@@ -89,20 +93,37 @@ pub struct Tile<'a> {
     /// The tile's pixels within the film's bounds, in the order of their sums below.
     origin: [u32; 2],
     bounds: Bounds,
+    /// Index of the first pixel in its film.
+    first: u32,
     pixels: &'a mut [Pixel],
     auxiliary: &'a mut [Auxiliary],
+    split: &'a mut [Split],
+}
+
+/// A pixel of a tile.
+pub struct TilePixel<'a> {
+    /// Column and row in the frame.
+    pub at: [u32; 2],
+    /// Its number within the film.
+    pub index: u32,
+    /// Its sums.
+    pub pixel: &'a mut Pixel,
+    /// Its first-hit sums, if they are kept.
+    pub auxiliary: Option<&'a mut Auxiliary>,
+    /// Its sums for the filter, if they are kept.
+    pub split: Option<&'a mut Split>,
 }
 
 impl Tile<'_> {
-    /// Calls `visit` for each pixel of the tile that is within the film, with its coordinates and its sums.
-    pub fn for_each(&mut self, mut visit: impl FnMut([u32; 2], &mut Pixel, Option<&mut Auxiliary>)) {
+    /// Calls `visit` for each pixel of the tile that is within the film.
+    pub fn for_each(&mut self, mut visit: impl FnMut(TilePixel<'_>)) {
         let mut auxiliary = self.auxiliary.iter_mut();
-        for (at, pixel) in self.pixels.iter_mut().enumerate() {
-            let auxiliary = auxiliary.next();
-            let x = self.origin[0] + at as u32 % TILE;
-            let y = self.origin[1] + at as u32 / TILE;
-            if x < self.bounds.max[0] && y < self.bounds.max[1] {
-                visit([x, y], pixel, auxiliary);
+        let mut split = self.split.iter_mut();
+        for (offset, pixel) in (0..).zip(self.pixels.iter_mut()) {
+            let (auxiliary, split) = (auxiliary.next(), split.next());
+            let at = [self.origin[0] + offset % TILE, self.origin[1] + offset / TILE];
+            if at[0] < self.bounds.max[0] && at[1] < self.bounds.max[1] {
+                visit(TilePixel { at, index: self.first + offset, pixel, auxiliary, split });
             }
         }
     }
@@ -114,7 +135,13 @@ impl Film {
         let tiles = [bounds.width().div_ceil(TILE), bounds.height().div_ceil(TILE)];
         let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
         let auxiliary = if aovs.first_hit() { vec![Auxiliary::default(); count] } else { Vec::new() };
-        Self { resolution, bounds, aovs, tiles, pixels: vec![Pixel::default(); count], auxiliary }
+        let pixels = vec![Pixel::default(); count];
+        Self { resolution, bounds, aovs, tiles, pixels, auxiliary, split: Vec::new(), filtered: Vec::new() }
+    }
+
+    /// The same film with the sums that a filter needs.
+    pub fn with_split(self) -> Self {
+        Self { split: vec![Split::default(); self.pixels.len()], ..self }
     }
 
     /// Bytes that a film of this shape holds.
@@ -144,14 +171,17 @@ impl Film {
     pub fn tiles(&mut self) -> Vec<Tile<'_>> {
         let (bounds, across) = (self.bounds, self.tiles[0]);
         let mut auxiliary = self.auxiliary.chunks_mut((TILE * TILE) as usize);
+        let mut split = self.split.chunks_mut((TILE * TILE) as usize);
         self.pixels
             .chunks_mut((TILE * TILE) as usize)
             .zip(0u32..)
             .map(|(pixels, index)| Tile {
                 origin: [bounds.min[0] + index % across * TILE, bounds.min[1] + index / across * TILE],
                 bounds,
+                first: index * TILE * TILE,
                 pixels,
                 auxiliary: auxiliary.next().unwrap_or_default(),
+                split: split.next().unwrap_or_default(),
             })
             .collect()
     }
@@ -166,23 +196,43 @@ impl Film {
         self.auxiliary.get(self.index(at))
     }
 
-    /// Mean radiance over all pixels, film RGB.
-    pub fn mean(&self) -> Rgb {
-        let mut sum = glam::DVec3::ZERO;
-        for y in self.bounds.min[1]..self.bounds.max[1] {
-            for x in self.bounds.min[0]..self.bounds.max[0] {
-                sum += self.pixel([x, y]).mean();
-            }
-        }
-        (sum / self.bounds.area().max(1) as f64).as_vec3()
+    /// The filter's sums of the pixel at `[x, y]`, if they are kept.
+    pub fn split(&self, at: [u32; 2]) -> Option<&Split> {
+        self.split.get(self.index(at))
     }
 
-    fn index(&self, [x, y]: [u32; 2]) -> usize {
+    /// Sets what the filter makes of all pixels, film RGB, row by row over the bounds.
+    pub fn set_filtered(&mut self, values: &[Rgb]) {
+        self.filtered = vec![Rgb::ZERO; self.pixels.len()];
+        for (value, at) in values.iter().zip(self.bounds.pixels()) {
+            let index = self.index(at);
+            self.filtered[index] = *value;
+        }
+    }
+
+    /// Value of the pixel at `[x, y]`, film RGB: filtered if the frame is.
+    pub fn value(&self, at: [u32; 2]) -> glam::DVec3 {
+        self.filtered.get(self.index(at)).map_or_else(|| self.pixel(at).mean(), |value| value.as_dvec3())
+    }
+
+    /// One past the largest index of a pixel.
+    pub fn slots(&self) -> usize {
+        self.pixels.len()
+    }
+
+    /// Index of the pixel at `[x, y]`, as [`TilePixel::index`].
+    pub fn index(&self, [x, y]: [u32; 2]) -> usize {
         assert!((self.bounds.min[0]..self.bounds.max[0]).contains(&x), "column {x} is outside the film");
         assert!((self.bounds.min[1]..self.bounds.max[1]).contains(&y), "row {y} is outside the film");
         let (x, y) = (x - self.bounds.min[0], y - self.bounds.min[1]);
         let tile = (y / TILE * self.tiles[0] + x / TILE) as usize;
         tile * (TILE * TILE) as usize + (y % TILE * TILE + x % TILE) as usize
+    }
+
+    /// Mean radiance over all pixels, film RGB.
+    pub fn mean(&self) -> Rgb {
+        let sum: glam::DVec3 = self.bounds.pixels().map(|at| self.value(at)).sum();
+        (sum / self.bounds.area().max(1) as f64).as_vec3()
     }
 }
 
@@ -195,7 +245,7 @@ mod tests {
         let bounds = Bounds { min: [5, 3], max: [40, 21] };
         let mut film = Film::new([50, 30], bounds, AovSet::all());
         for mut tile in film.tiles() {
-            tile.for_each(|[x, y], pixel, auxiliary| {
+            tile.for_each(|TilePixel { at: [x, y], pixel, auxiliary, .. }| {
                 pixel.add(Rgb::splat((100 * y + x) as f32), 1.0, 1.0);
                 assert!(auxiliary.is_some());
             });

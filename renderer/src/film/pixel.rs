@@ -53,7 +53,8 @@ impl Pixel {
         ((self.sum_of_squares - self.sum * self.sum / n) / (n - 1.0)).max(DVec3::ZERO)
     }
 
-    fn normalisation(&self) -> f64 {
+    /// What sums are divided by.
+    pub fn normalisation(&self) -> f64 {
         let n = self.count.max(1) as f64;
         // Half the expected sum: a smaller one has lost most of its digits to cancellation.
         if self.weight > 0.5 * n { self.weight } else { n }
@@ -86,6 +87,28 @@ impl Auxiliary {
         self.p += first.p.as_dvec3();
         self.depth += f64::from(first.depth);
         self.hits += 1;
+    }
+}
+
+/// What a filtered frame keeps of a pixel besides [`Pixel`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Split {
+    /// Σ w L of the light that the filter does not touch, scene RGB.
+    pub prefix: DVec3,
+    /// Σ w L of odd samples, film RGB.
+    pub odd: DVec3,
+    /// Σ w of odd samples.
+    pub odd_weight: f64,
+}
+
+impl Split {
+    /// Adds a sample: its whole radiance (film RGB), and what of it the filter leaves alone (scene RGB).
+    pub fn add(&mut self, index: u64, radiance: Rgb, prefix: Rgb, weight: f32) {
+        self.prefix += (prefix * weight).as_dvec3();
+        if index % 2 == 1 {
+            self.odd += (radiance * weight).as_dvec3();
+            self.odd_weight += f64::from(weight);
+        }
     }
 }
 

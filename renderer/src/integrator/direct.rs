@@ -65,21 +65,34 @@ impl Vertex<'_> {
     }
 }
 
-/// Radiance that a light sample sends by way of `vertex` along `wo`, weighted against the BSDF sample.
-pub fn estimate<Q: Queries>(
+/// What a light sample sends to a vertex.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectLight {
+    /// Where it comes from, in the frame of the vertex's shading.
+    pub wi: LocalDir,
+    /// f·|cosθᵢ| of the whole BSDF, sr⁻¹.
+    pub f: Rgb,
+    /// Radiance over the density of the sample, sr, weighted against the BSDF sample: times `f` this is what the vertex
+    /// sends along `wo`.
+    pub incident: Rgb,
+}
+
+/// Samples a light for `vertex`. `None`: no light arrives that the BSDF would send along `wo`.
+pub fn sample<Q: Queries>(
     world: &World,
     queries: &Q,
     vertex: &Vertex<'_>,
     numbers: &Numbers,
     bounce: u32,
     counters: &mut Counters,
-) -> Rgb {
+) -> Option<DirectLight> {
     let u_select = numbers.d1(Dimension::at(bounce, Use::LightSelect));
     let u = numbers.d2(Dimension::at(bounce, Use::Light));
-    let Some(light) = world.lights.sample(&vertex.receiver(), u_select, u) else { return Rgb::ZERO };
-    let (f, bsdf_pdf) = vertex.shading.bsdf.eval_pdf(vertex.wo, vertex.shading.frame.to_local(light.wi));
+    let light = world.lights.sample(&vertex.receiver(), u_select, u)?;
+    let wi = vertex.shading.frame.to_local(light.wi);
+    let (f, bsdf_pdf) = vertex.shading.bsdf.eval_pdf(vertex.wo, wi);
     if f == Rgb::ZERO {
-        return Rgb::ZERO;
+        return None;
     }
     let (point, ng) = (vertex.surface.point, vertex.surface.ng);
     let segment = match light.target {
@@ -89,12 +102,12 @@ pub fn estimate<Q: Queries>(
     };
     counters.shadow_rays += 1;
     if queries.occluded(&segment) {
-        return Rgb::ZERO;
+        return None;
     }
     let weight = match world.techniques {
         Techniques::Both if !light.delta => power_heuristic(light.pdf, bsdf_pdf),
         Techniques::Bsdfs if !light.delta => 0.0,
         _ => 1.0,
     };
-    f * light.radiance * (weight / light.pdf)
+    Some(DirectLight { wi, f, incident: light.radiance * (weight / light.pdf) })
 }

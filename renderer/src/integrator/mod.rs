@@ -4,11 +4,13 @@ mod direct;
 mod path;
 mod queries;
 mod record;
+mod recorder;
 mod roulette;
 
 pub use path::trace;
 pub use queries::{AlphaTested, Opaque, Queries, Recorded, Recording};
 pub use record::{FirstHit, Sample};
+pub use recorder::{Cut, Recorder, Unrecorded};
 
 /// How many rays of each kind were traced, and what became of samples. Sums over pixels: the same for any threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

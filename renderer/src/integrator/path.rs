@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::direct::{self, Scatter, Vertex};
-use super::{Counters, FirstHit, Queries, Sample, roulette};
+use super::direct::{self, DirectLight, Scatter, Vertex};
+use super::{Counters, FirstHit, Queries, Recorder, Sample, roulette};
 use crate::bsdf::BsdfSample;
 use crate::camera::CameraRay;
 use crate::math::{Ray, Rgb, spawn_ray};
@@ -13,31 +13,32 @@ use crate::world::World;
 /// Radiance along one camera ray, by unidirectional path tracing with a light sample at every vertex.
 ///
 /// Both ways to reach a light, by sampling the light and by sampling the BSDF, are weighted by the power heuristic.
-/// `first_hit` asks for the auxiliary values of the first hit. The result is a pure function of the world, the camera
-/// ray and the numbers.
+/// `first_hit` asks for the auxiliary values of the first hit; `recorder` sees all that happens. The result is a pure
+/// function of the world, the camera ray and the numbers.
 ///
 /// **Source**: \[Kajiya86\]; \[Veach97\] chapter 9 for the weights.
-pub fn trace<Q: Queries>(
+pub fn trace<Q: Queries, R: Recorder>(
     world: &World,
     queries: &Q,
     camera: &CameraRay,
     numbers: &Numbers,
     first_hit: bool,
+    recorder: &mut R,
     counters: &mut Counters,
 ) -> Sample {
-    let mut path = Path::new(camera);
+    let mut path = Path::new(camera, recorder);
     let mut sample = Sample::default();
     counters.camera_rays += 1;
     loop {
         // Where the path goes next, and the light it runs into there.
         counters.closest_hit_rays += 1;
         let Some(hit) = queries.intersect(&path.ray) else {
-            path.radiance += path.beta * direct::escaped(world, path.ray.direction, path.last.as_ref());
+            path.meets(direct::escaped(world, path.ray.direction, path.last.as_ref()));
             break;
         };
         let surface = world.geometry.interaction(&path.ray, &hit);
-        path.cone_radius += path.cone_spread * surface.t;
-        path.radiance += path.beta * direct::emitted(world, &surface, path.last.as_ref());
+        path.advance(surface.t);
+        path.meets(direct::emitted(world, &surface, path.last.as_ref()));
         if path.bounce == world.integrator.max_depth {
             break;
         }
@@ -57,8 +58,10 @@ pub fn trace<Q: Queries>(
         }
 
         // Light that a light sample brings, and the direction in which the path goes on.
+        path.arrive(&vertex);
         if !vertex.shading.bsdf.is_specular() {
-            path.radiance += path.beta * direct::estimate(world, queries, &vertex, numbers, path.bounce, counters);
+            let light = direct::sample(world, queries, &vertex, numbers, path.bounce, counters);
+            light.iter().for_each(|light| path.receive(&vertex, light));
         }
         let u_lobe = numbers.d1(Dimension::at(path.bounce, Use::Lobe));
         let u = numbers.d2(Dimension::at(path.bounce, Use::Bsdf));
@@ -69,14 +72,14 @@ pub fn trace<Q: Queries>(
         let throughput = path.beta.max_element() * path.eta_scale;
         let u = || numbers.d1(Dimension::at(path.bounce, Use::Roulette));
         let Some(worth) = roulette::survive(throughput, path.bounce, u) else { break };
-        path.beta *= worth;
+        path.survive(worth);
     }
     sample.radiance = path.radiance;
     sample
 }
 
 /// What a path carries from vertex to vertex.
-struct Path {
+struct Path<'r, R> {
     /// Radiance found so far, along the camera ray.
     radiance: Rgb,
     /// Product of f cosθ / pdf over the vertices so far.
@@ -95,6 +98,12 @@ struct Path {
     cone_radius: f32,
     /// Growth of that radius per unit of distance.
     cone_spread: f32,
+    /// Half the side of a pixel at the length of the path so far, as if every scattering had been a reflection.
+    reach: f32,
+    /// Growth of that per unit of distance.
+    pixel_spread: f32,
+    /// Is told of everything.
+    recorder: &'r mut R,
 }
 
 /// A scattered path stands for this share of the lobe it was drawn from: sixteen paths through a pixel, each with a cone
@@ -102,8 +111,8 @@ struct Path {
 /// a little blunter or sharper than it might be.
 const LOBE_SHARE: f32 = 1.0 / 16.0;
 
-impl Path {
-    fn new(camera: &CameraRay) -> Self {
+impl<'r, R: Recorder> Path<'r, R> {
+    fn new(camera: &CameraRay, recorder: &'r mut R) -> Self {
         Self {
             radiance: Rgb::ZERO,
             beta: Rgb::ONE,
@@ -114,13 +123,51 @@ impl Path {
             roughened: false,
             cone_radius: camera.radius,
             cone_spread: camera.spread,
+            reach: camera.radius,
+            pixel_spread: camera.spread,
+            recorder,
         }
+    }
+
+    /// The ray has met a surface at `distance`.
+    #[inline]
+    fn advance(&mut self, distance: f32) {
+        self.cone_radius += self.cone_spread * distance;
+        self.reach += self.pixel_spread * distance;
+    }
+
+    /// The ray has run into light.
+    #[inline]
+    fn meets(&mut self, radiance: Rgb) {
+        self.radiance += self.beta * radiance;
+        self.recorder.meets(radiance);
+    }
+
+    /// The path is at a surface that scatters.
+    #[inline]
+    fn arrive(&mut self, vertex: &Vertex<'_>) {
+        self.recorder.arrive(vertex, 2.0 * self.reach);
+    }
+
+    /// A light sample brings light to `vertex`.
+    #[inline]
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
+        self.radiance += self.beta * (light.f * light.incident);
+        self.recorder.receive(vertex, light);
+    }
+
+    /// The path has survived a roulette, and stands for those that did not.
+    #[inline]
+    fn survive(&mut self, worth: f32) {
+        self.beta *= worth;
+        self.recorder.survive(worth);
     }
 
     /// Goes on from `vertex` in the direction of `next`.
     fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
         let wi: Vec3 = vertex.shading.frame.to_world(next.wi);
         self.beta *= next.weight;
+        self.recorder.scatter(vertex, next);
         self.ray = spawn_ray(vertex.surface.point, vertex.surface.ng, wi);
         self.bounce += 1;
         if next.transmission {

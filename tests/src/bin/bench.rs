@@ -13,6 +13,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use renderer::film::{AovSet, Film};
+use renderer::filtering::Nothing;
 use renderer::integrator::{AlphaTested, Opaque, Queries, Recorded, Recording};
 use renderer::render::{self, Job, Prepared, Unobserved};
 use renderer::sampling::Sampler;
@@ -72,7 +73,7 @@ fn replay<Q: Queries + Sync>(prepared: &Prepared, queries: &Q, spp: u64) -> f64 
     for pass in render::passes(&(0..spp)) {
         film.tiles().par_iter_mut().for_each(|tile| {
             let recording = Recording::new(queries);
-            render::trace_tile(world, &recording, tile, &pass, &sampler, false);
+            render::trace_tile(world, &recording, tile, &pass, &sampler, false, &mut Nothing);
             let log = recording.into_log();
             let start = Instant::now();
             let hits = log.iter().filter(|query| match query {

@@ -1,0 +1,226 @@
+//! Cutting a path at the vertices that the filter shares with other paths.
+
+use filter::{Lobe, PackedRgb, PathRecord};
+use glam::Vec3;
+
+use super::direct::{DirectLight, Vertex};
+use crate::bsdf::BsdfSample;
+use crate::math::Rgb;
+
+/// Is told of everything that happens to a path, in order.
+pub trait Recorder {
+    /// The path is at a surface that scatters. `footprint`: side of the square that a pixel covers there, world units, if
+    /// the surfaces so far are taken for flat mirrors.
+    fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32);
+    /// A light sample brings light to the vertex.
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight);
+    /// The path goes on.
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample);
+    /// What follows stands for `worth` times as much.
+    fn survive(&mut self, worth: f32);
+    /// The path has run into `radiance`.
+    fn meets(&mut self, radiance: Rgb);
+}
+
+/// Records nothing.
+#[derive(Default)]
+pub struct Unrecorded;
+
+impl Recorder for Unrecorded {
+    #[inline]
+    fn arrive(&mut self, _: &Vertex<'_>, _: f32) {}
+    #[inline]
+    fn receive(&mut self, _: &Vertex<'_>, _: &DirectLight) {}
+    #[inline]
+    fn scatter(&mut self, _: &Vertex<'_>, _: &BsdfSample) {}
+    #[inline]
+    fn survive(&mut self, _: f32) {}
+    #[inline]
+    fn meets(&mut self, _: Rgb) {}
+}
+
+/// A path cut in three: up to the first vertex that is no mirror and no smooth glass, from there to the next diffuse one,
+/// and what follows.
+///
+/// Each piece counts its light from its own beginning, with throughput 1 there, so that nothing is ever divided by a
+/// throughput. [`Cut::record`] puts the pieces together.
+#[derive(Clone, Copy, Debug)]
+pub struct Cut {
+    /// Light that is met before the first selected vertex, and all of a path without one.
+    prefix: Rgb,
+    first: Option<Selected>,
+    second: Option<Selected>,
+    /// Light that is met between the selected vertices, from the first on.
+    between: Rgb,
+    /// Light that is met beyond the second, from there on.
+    beyond: Rgb,
+    /// Throughput from the last selected vertex, or from the camera.
+    beta: Rgb,
+    /// Where the path is, is a selected vertex.
+    here: bool,
+}
+
+/// A vertex at which a path is cut.
+#[derive(Clone, Copy, Debug)]
+struct Selected {
+    vertex: filter::Vertex,
+    /// Throughput up to the vertex, from the cut before.
+    beta: Rgb,
+    /// [`crate::bsdf::Bsdf::diffuse_albedo`].
+    albedo: Rgb,
+    /// Light of the light sample that arrives in the diffuse lobe, over the albedo; and what the other lobes send on.
+    received: [Rgb; 2],
+    /// The same for light from the direction in which the path goes on.
+    weight: (f32, Rgb),
+}
+
+impl Selected {
+    fn new(vertex: &Vertex<'_>, footprint: f32, beta: Rgb) -> Self {
+        let shading = vertex.shading;
+        let side = if vertex.wo.cos_theta() < 0.0 { -1.0 } else { 1.0 };
+        Self {
+            vertex: filter::Vertex::new(
+                vertex.surface.point.p,
+                side * vertex.surface.ng,
+                footprint,
+                vertex.surface.geometry,
+                reflection_bin(side * shading.frame.n, vertex.surface.wo),
+            ),
+            beta,
+            albedo: shading.bsdf.diffuse_albedo(vertex.wo),
+            received: [Rgb::ZERO; 2],
+            weight: (0.0, Rgb::ZERO),
+        }
+    }
+
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
+        let diffuse = vertex.shading.bsdf.diffuse(vertex.wo, light.wi);
+        self.received[0] += diffuse * light.incident;
+        self.received[1] += (light.f - self.albedo * diffuse).max(Rgb::ZERO) * light.incident;
+    }
+
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+        // A delta lobe is none of the diffuse one's directions.
+        let diffuse = if next.specular { 0.0 } else { vertex.shading.bsdf.diffuse(vertex.wo, next.wi) / next.pdf };
+        // The difference of nearly equal numbers where there is no other lobe: rounding may have it negative.
+        self.weight = (diffuse, (next.weight - self.albedo * diffuse).max(Rgb::ZERO));
+    }
+
+    fn survive(&mut self, worth: f32) {
+        self.weight = (self.weight.0 * worth, self.weight.1 * worth);
+    }
+
+    /// Light in the diffuse lobe, over the albedo, and out of the others, when `incident` comes from where the path went.
+    fn lobes(&self, incident: Rgb) -> [Rgb; 2] {
+        [self.received[0] + self.weight.0 * incident, self.received[1] + self.weight.1 * incident]
+    }
+}
+
+impl Default for Cut {
+    fn default() -> Self {
+        Self {
+            prefix: Rgb::ZERO,
+            first: None,
+            second: None,
+            between: Rgb::ZERO,
+            beyond: Rgb::ZERO,
+            beta: Rgb::ONE,
+            here: false,
+        }
+    }
+}
+
+impl Recorder for Cut {
+    fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32) {
+        let bsdf = &vertex.shading.bsdf;
+        let next = match (&self.first, &self.second) {
+            (None, _) if !bsdf.is_specular() => &mut self.first,
+            (Some(_), None) if bsdf.diffuse_albedo(vertex.wo) != Rgb::ZERO => &mut self.second,
+            _ => {
+                self.here = false;
+                return;
+            }
+        };
+        *next = Some(Selected::new(vertex, footprint, self.beta));
+        self.here = true;
+    }
+
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
+        match (self.here, &mut self.first, &mut self.second) {
+            (true, _, Some(second)) => second.receive(vertex, light),
+            (true, Some(first), None) => first.receive(vertex, light),
+            _ => self.meets(light.f * light.incident),
+        }
+    }
+
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+        match (self.here, &mut self.first, &mut self.second) {
+            (true, _, Some(last)) | (true, Some(last), None) => {
+                last.scatter(vertex, next);
+                self.beta = Rgb::ONE;
+            }
+            _ => self.beta *= next.weight,
+        }
+    }
+
+    fn survive(&mut self, worth: f32) {
+        match (self.here, &mut self.first, &mut self.second) {
+            (true, _, Some(last)) | (true, Some(last), None) => last.survive(worth),
+            _ => self.beta *= worth,
+        }
+    }
+
+    fn meets(&mut self, radiance: Rgb) {
+        let piece = match (&self.first, &self.second) {
+            (None, _) => &mut self.prefix,
+            (Some(_), None) => &mut self.between,
+            (Some(_), Some(_)) => &mut self.beyond,
+        };
+        *piece += self.beta * radiance;
+    }
+}
+
+impl Cut {
+    /// Light that no selected vertex sent on, along the camera ray.
+    pub fn prefix(&self) -> Rgb {
+        self.prefix
+    }
+
+    /// The rest of the path, for the filter; `None` if there is none. `weight`: of the sample, of either sign.
+    pub fn record(&self, slot: u32, sample: u64, weight: f32) -> Option<PathRecord> {
+        let first = self.first.as_ref()?;
+        let mut record = PathRecord { slot, first: first.vertex, ..PathRecord::default() };
+        record.set_sample(sample as u8);
+        let mut rest = self.between;
+        let mut transfer = Rgb::ZERO;
+        if let Some(second) = &self.second {
+            let [suffix, others] = second.lobes(self.beyond);
+            rest += second.beta * others;
+            transfer = second.beta * second.albedo;
+            record.second = second.vertex;
+            record.set_sample(sample as u8);
+            record.suffix = PackedRgb::new(suffix);
+        }
+        let [diffuse, glossy] = first.lobes(rest);
+        let lobe = |throughput: Rgb, rest: Rgb, transfer: Rgb| Lobe {
+            throughput: PackedRgb::new(throughput * first.beta * weight),
+            rest: PackedRgb::new(rest),
+            transfer: PackedRgb::new(transfer),
+        };
+        if first.albedo != Rgb::ZERO {
+            record.diffuse = lobe(first.albedo, diffuse, first.weight.0 * transfer);
+        }
+        let transfer = first.weight.1 * transfer;
+        if glossy != Rgb::ZERO || transfer != Rgb::ZERO || first.albedo == Rgb::ZERO {
+            record.glossy = lobe(Rgb::ONE, glossy, transfer);
+        }
+        Some(record)
+    }
+}
+
+/// Which of 16 parts of the sphere the reflection of `wo` about `n` goes to: glossy light from different parts is not
+/// averaged.
+fn reflection_bin(n: Vec3, wo: Vec3) -> u8 {
+    let reflected = 2.0 * n.dot(wo) * n - wo;
+    filter::direction_bin(reflected)
+}
