@@ -10,6 +10,7 @@ mod record;
 mod shrink;
 mod sums;
 mod table;
+pub mod talk;
 
 pub use adaptive::{Adaptive, Params, Report, Resolved};
 pub use grid::Anchor;
