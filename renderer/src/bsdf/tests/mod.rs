@@ -3,6 +3,7 @@
 mod chi_square;
 mod energy;
 mod layered;
+mod layered_values;
 mod limits;
 
 use std::sync::LazyLock;
