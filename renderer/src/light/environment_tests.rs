@@ -106,6 +106,28 @@ fn a_sample_says_what_a_ray_finds() {
 }
 
 #[test]
+fn a_sample_is_withheld_only_below_the_horizon() {
+    // Sides that tiles fill and do not fill.
+    for (size, transform) in [(64, 0), (131, 1), (258, 2)] {
+        let light = image_light(sky(size), transforms()[transform]);
+        let mut random = Random::new(16);
+        let mut withheld = 0;
+        for _ in 0..20_000 {
+            let u = random.square();
+            let n = octahedral::direction_from_square(random.square());
+            match (light.sample(n, u), light.sample(Vec3::ZERO, u).unwrap()) {
+                (Some(sample), all) => assert_eq!((sample.wi, sample.pdf), (all.wi, all.pdf)),
+                (None, all) => {
+                    assert!(all.wi.dot(n) <= 0.0, "{size}: {n} {}", all.wi);
+                    withheld += 1;
+                }
+            }
+        }
+        assert!(withheld > 5000, "{size}: {withheld}");
+    }
+}
+
+#[test]
 fn irradiance_is_the_mean_of_samples() {
     for (index, transform) in transforms().into_iter().enumerate() {
         let smooth = image(16, |x, y| Rgb::new(0.1 + x as f32, 3.0, (x * y) as f32));

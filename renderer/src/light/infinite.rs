@@ -73,7 +73,7 @@ impl Infinite {
                 let pdf = uniform_pdf(wi, n);
                 (pdf > 0.0).then_some(DirectionSample { wi, radiance: *radiance, pdf, delta: false })
             }
-            Infinite::Image(image) => image.sample(u),
+            Infinite::Image(image) => image.sample(n, u),
             Infinite::Distant { irradiance, wi } => {
                 Some(DirectionSample { wi: *wi, radiance: *irradiance, pdf: 1.0, delta: true })
             }

@@ -5,6 +5,14 @@ use std::f32::consts::{FRAC_2_PI, FRAC_PI_4};
 
 use glam::{Vec2, Vec3};
 
+/// How far apart two directions are at most, per distance of their points in the square.
+///
+/// With s = |x| + |y| and t = |y| − |x| of the point in [−1, 1]², in the upper hemisphere cosθ = 1 − s² and
+/// φ = π/4 (1 + t/s), so that θ changes by 2/√(2 − s²) ds and the arc along φ by π/4 √(2 − s²) (dt − t/s ds). The squares
+/// of these three factors sum to at most 4 + π²/8, at s = 1 and |t| = s. The square's sides are 1 instead of 2, and (s, t)
+/// are longer than (x, y) by √2: the stretch is at most √(8 · (4 + π²/8)) = 6.47.
+pub const STRETCH: f32 = 6.48;
+
 /// The unit direction at `uv` in [0, 1]². The centre of the square is +z, its corners are −z; u grows along x, v along y.
 ///
 /// Equal areas of the square are equal solid angles: the density on the sphere is that on the square over 4π.
@@ -54,6 +62,13 @@ mod tests {
             let again = direction_from_square(square_from_direction(d));
             // uv is rounded to 2⁻²⁴, and moves the direction by up to √8 as fast.
             prop_assert!((again - d).length() < 1e-6, "{d} {again}");
+        }
+
+        #[test]
+        fn neighbours_stay_neighbours(u in 0.0f32..=1.0, v in 0.0f32..=1.0, du in -0.1f32..0.1, dv in -0.1f32..0.1) {
+            let near = Vec2::new(u + du, v + dv).clamp(Vec2::ZERO, Vec2::ONE);
+            let apart = (direction_from_square(near) - direction_from_square(Vec2::new(u, v))).length();
+            prop_assert!(apart <= STRETCH * (near - Vec2::new(u, v)).length() + 1e-6, "{apart}");
         }
 
         #[test]

@@ -122,6 +122,14 @@ impl PiecewiseConstant2D {
         (Vec2::new(x, y), self.density[row * self.width + column], [column, row])
     }
 
+    /// The cell (x, y) in which [`Self::sample`] finds its point, and where in the cell, in [0, 1)².
+    #[inline]
+    pub fn sample_cell(&self, u: Vec2) -> ([usize; 2], Vec2) {
+        let (row, y) = invert_to_bin(&self.marginal.cdf, &self.marginal.index, u.y);
+        let (column, x) = invert_to_bin(self.row_cdf(row), self.row_index(row), u.x);
+        ([column, row], Vec2::new(x, y))
+    }
+
     /// The density at `p`, 0 outside [0, 1)².
     #[inline]
     pub fn pdf(&self, p: Vec2) -> f32 {
@@ -198,17 +206,24 @@ fn bin_of(x: f32, bins: usize) -> Option<usize> {
     (0.0..1.0).contains(&x).then(|| (f64::from(x) * bins as f64) as usize)
 }
 
-/// The `x` whose cumulative probability is `u`, and its bin.
+/// The bin in which the cumulative probability reaches `u`, and how far into it, in [0, 1).
 #[inline]
-fn invert_cdf(cdf: &[f32], index: &[u32], u: f32) -> (f32, usize) {
+fn invert_to_bin(cdf: &[f32], index: &[u32], u: f32) -> (usize, f32) {
     let u = u.clamp(0.0, BELOW_ONE);
-    let bins = cdf.len() - 1;
     // The last bin that starts at or before u: it cannot be empty, since the next one starts after u.
     let entry = (u * (index.len() - 1) as f32) as usize;
     let (first, last) = (index[entry] as usize, index[entry + 1] as usize);
     let bin = first + cdf[first + 1..=last].partition_point(|&c| c <= u);
     let (low, high) = (cdf[bin], cdf[bin + 1]);
-    let x = ((bin as f64 + f64::from((u - low) / (high - low))) / bins as f64) as f32;
+    (bin, ((u - low) / (high - low)).min(BELOW_ONE))
+}
+
+/// The `x` whose cumulative probability is `u`, and its bin.
+#[inline]
+fn invert_cdf(cdf: &[f32], index: &[u32], u: f32) -> (f32, usize) {
+    let bins = cdf.len() - 1;
+    let (bin, within) = invert_to_bin(cdf, index, u);
+    let x = ((bin as f64 + f64::from(within)) / bins as f64) as f32;
     // Rounding can leave the bin by an ulp at either end; there the density would be another. x is not negative, so the
     // neighbouring floats have neighbouring bits.
     let x = x.min(BELOW_ONE);
