@@ -86,9 +86,8 @@ pub struct Params {
     /// Bins of the normal along each edge of a cube's six faces; 0: not in the key. Default 3: bins of 30°, and walls
     /// along the axes, the most frequent, fall on the middle of one.
     pub normal_bins: u32,
-    /// Jitter of the normal, as half the side of a square in bins. Default ½, for the reason that positions have it; of
-    /// the paths at a wall, with its normal in the middle of a bin, a hundredth leaves the bin, for the record's normals
-    /// are rounded.
+    /// Jitter of the normal, as half the side of a square in bins. Default 0.49: ½, for the reason that positions have
+    /// it, less what the rounding of a record's normals could carry from the middle of a bin, where walls are, to the next.
     pub normal_jitter: f32,
     /// Whether vertices with different [`crate::Vertex::surface`]s are told apart. Default: yes, as the record promises.
     pub surface: bool,
@@ -130,7 +129,7 @@ impl Default for Params {
             level: LevelOfDetail::Footprint { side: 8.0 },
             jitter: Jitter::Square { radius: 0.5 },
             normal_bins: 3,
-            normal_jitter: 0.5,
+            normal_jitter: 0.49,
             surface: true,
             direction: true,
             layers: true,
