@@ -1,0 +1,4 @@
+//! Other people's filters, to be compared with.
+
+pub mod cross_bilateral;
+pub mod range_search;
