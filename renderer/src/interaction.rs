@@ -119,7 +119,7 @@ impl Geometry {
     /// The surface at a hit of `ray`.
     ///
     /// **Source** of the points: \[Pharr23\] section 6.8; of their errors: `rounding`.
-    #[inline]
+    #[inline(always)]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> SurfaceInteraction<'_> {
         let (geometry, instance) = self.locate(hit);
         let surface = &self.surfaces[geometry as usize];

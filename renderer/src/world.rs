@@ -108,7 +108,7 @@ impl World {
     /// The material at a hit, ready to scatter; `None` at an interface that is no surface.
     ///
     /// `cone_radius`: of the path's cone at the hit, world units.
-    #[inline]
+    #[inline(always)]
     pub fn shade(&self, vertex: &SurfaceInteraction<'_>, cone_radius: f32) -> Option<Shading<'_>> {
         let id = self.geometry.material(vertex);
         // What a material does not look at is not computed: most are one constant and need neither.

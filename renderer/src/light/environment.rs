@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, Mat3, Vec2, Vec3};
 
-use super::choose::choose;
+use super::choose::{Choice, choose};
 use super::image::LightImage;
 use super::infinite::DirectionSample;
 use super::octahedral;
@@ -160,8 +160,8 @@ impl Environment {
         let importances: [[f32; TILE]; TILE] =
             std::array::from_fn(|y| std::array::from_fn(|x| self.importance(tile.sums[y][x])));
         let rows: [f32; TILE] = std::array::from_fn(|y| importances[y].iter().sum());
-        let (y, v) = choose(&rows, within.y)?;
-        let (x, u) = choose(&importances[y], within.x)?;
+        let Choice { index: y, rest: v, .. } = choose(&rows, within.y)?;
+        let Choice { index: x, rest: u, .. } = choose(&importances[y], within.x)?;
         let corner = Vec2::new((column * TILE + x) as f32, (row * TILE + y) as f32);
         // Not so near the next texel that the sum rounds to it.
         let inside = Vec2::new(u, v).min(Vec2::splat(1.0 - self.size as f32 * f32::EPSILON));

@@ -74,10 +74,10 @@ impl LightTree {
         let (mut u, mut pmf) = (u, 1.0);
         loop {
             let importance = node.importance(from, self.per_scene);
-            let (lane, rest) = choose(&importance, u)?;
-            u = rest;
-            pmf *= importance[lane] / importance.iter().sum::<f32>();
-            let link = node.link[lane];
+            let lane = choose(&importance, u)?;
+            u = lane.rest;
+            pmf *= lane.pmf;
+            let link = node.link[lane.index];
             if link & LEAF != 0 {
                 return (pmf > 0.0).then_some((link & !LEAF, pmf));
             }

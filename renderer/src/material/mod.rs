@@ -153,7 +153,7 @@ impl Materials {
     ///
     /// A mixture chooses one of its materials by a hash of position and direction: an estimate without bias, and the same
     /// for the same path.
-    #[inline]
+    #[inline(always)]
     pub fn shade(&self, id: MaterialId, at: &Surface, textures: &Textures) -> Option<Shading<'_>> {
         let mut material = &self.list[id.index()];
         while let Kind::Mix { materials, amount } = &material.kind {
@@ -176,7 +176,7 @@ impl Materials {
         if material.anisotropic { Frame::from_normal_and_tangent(ns, dpdu) } else { Frame::from_normal(ns) }
     }
 
-    #[inline]
+    #[inline(always)]
     fn bsdf(&self, kind: &Kind, at: &TexturePoint, textures: &Textures) -> Option<Bsdf<'_>> {
         // What reflects more than it receives is no albedo, whatever a texture says.
         let albedo = |value: &Value<Rgb>| textures.rgb(value, at).clamp(Rgb::ZERO, Rgb::ONE);
