@@ -1,7 +1,5 @@
 //! Triangles as emitters: sampled by solid angle where that pays, by area elsewhere.
 
-use std::f64::consts::PI;
-
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{ShapeHit, ShapeSample, finite_solid_angle_pdf, in_range, solid_angle_pdf, usable};
@@ -105,13 +103,11 @@ impl Triangle {
             let b = warp::uniform_triangle(u);
             return self.sample_at(b.x, b.y, |point, n| solid_angle_pdf(1.0 / f64::from(self.area), from, point, n));
         };
-        let direction = seen.sample(u.x.into(), u.y.into());
-        let (_, b1, b2) = self.ray(from.as_dvec3(), direction)?;
-        // The direction lies inside the spherical triangle; what is outside the planar one is rounding.
-        let (b1, b2) = (b1.clamp(0.0, 1.0), b2.clamp(0.0, 1.0));
-        let excess = (b1 + b2).max(1.0);
-        let (b1, b2) = (b1 / excess, b2 / excess);
-        self.sample_at((1.0 - b1 - b2) as f32, b1 as f32, |_, _| (1.0 / seen.solid_angle) as f32)
+        let weights = seen.sample(u.x.into(), u.y.into());
+        let inverse = 1.0 / (weights[0] + weights[1] + weights[2]);
+        self.sample_at((weights[0] * inverse) as f32, (weights[1] * inverse) as f32, |_, _| {
+            (1.0 / seen.solid_angle) as f32
+        })
     }
 
     /// See [`super::Shape::pdf`].
@@ -173,8 +169,14 @@ struct SphericalTriangle {
     a: DVec3,
     b: DVec3,
     c: DVec3,
+    /// 1 over the distances of the vertices.
+    nearness: [f64; 3],
     /// |a · (b × c)|
     volume: f64,
+    /// 1 + a · b
+    ab: f64,
+    /// a · c + b · c
+    abc: f64,
     /// Steradians; NaN from a vertex.
     solid_angle: f64,
 }
@@ -182,49 +184,45 @@ struct SphericalTriangle {
 impl SphericalTriangle {
     /// **Source** of the solid angle: \[Oosterom83\] equation 8.
     fn new(p: &[Vec3; 3], from: Vec3) -> Self {
-        let [a, b, c] = p.map(|p| (p.as_dvec3() - from.as_dvec3()).normalize());
+        let to = p.map(|p| p.as_dvec3() - from.as_dvec3());
+        let nearness = to.map(|to| to.length_recip());
+        let [a, b, c] = [to[0] * nearness[0], to[1] * nearness[1], to[2] * nearness[2]];
         let volume = a.dot(b.cross(c)).abs();
-        let solid_angle = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
-        Self { a, b, c, volume, solid_angle }
+        let (ab, abc) = (1.0 + a.dot(b), (a + b).dot(c));
+        let solid_angle = 2.0 * volume.atan2(ab + abc);
+        Self { a, b, c, nearness, volume, ab, abc, solid_angle }
     }
 
-    /// A direction uniform in solid angle.
+    /// A direction uniform in solid angle, as weights of the vertices, not negative: the ray meets the flat triangle at
+    /// their mean.
     ///
-    /// **Source**: \[Arvo95\]. Differences that cancel for small triangles are written as products: cos Â − 1 as
-    /// −2 sin²(Â/2), and 1 − a·b as |a − b|²/2.
-    fn sample(&self, u0: f64, u1: f64) -> DVec3 {
-        let Self { a, b, c, volume, solid_angle } = *self;
-        let (normal_ab, normal_ac) = (a.cross(b), a.cross(c));
-        let lengths = normal_ab.length() * normal_ac.length();
-        // The angle at vertex a.
-        let (sin_alpha, cos_alpha) = (volume / lengths, normal_ab.dot(normal_ac) / lengths);
-
-        // Choose the area of the sub-triangle a, b, ĉ, and find ĉ on the arc from a to c that gives it.
-        let half_area = 0.5 * (u0 * solid_angle).min(2.0 * PI);
-        let (sin_half, cos_half) = half_area.sin_cos();
-        let (sin_area, one_minus_cos_area) = (2.0 * sin_half * cos_half, 2.0 * sin_half * sin_half);
-        let cos_area = 1.0 - one_minus_cos_area;
-        let s = sin_area * cos_alpha - cos_area * sin_alpha;
-        let t = cos_area * cos_alpha + sin_area * sin_alpha;
-        let u = sin_area * sin_alpha - one_minus_cos_area * cos_alpha;
-        let v = sin_area * cos_alpha + sin_alpha * (one_minus_cos_area - 0.5 * (a - b).length_squared());
-        let q = ((v * t - u * s) * cos_alpha - v) / ((v * s + u * t) * sin_alpha);
-        let q = if q.is_finite() { q.clamp(-1.0, 1.0) } else { 1.0 };
-        let c_hat = a * q + orthogonal_part(c, a) * (1.0 - q * q).max(0.0).sqrt();
+    /// **Source**: \[Peters21\] "BRDF Importance Sampling for Polygonal Lights", for the half vector. The
+    /// differences that cancel for small triangles are left out: with w = 1 − b·ĉ = |b − ĉ|²/2 and a cosine of 1 − u₁w
+    /// to b, (1 − cos²)/(1 − (b·ĉ)²) is u₁(2 − u₁w)/(2 − w).
+    fn sample(&self, u0: f64, u1: f64) -> [f64; 3] {
+        let Self { a, b, c, .. } = *self;
+        // Choose the area of the sub-triangle a, b, ĉ. The vector half way from a to ĉ, on the arc from a to c, has the
+        // coordinates that give its area by the formula for the solid angle.
+        let (sin, cos) = (0.5 * u0 * self.solid_angle).sin_cos();
+        let half = [self.volume * cos - self.abc * sin, self.ab * sin];
+        let h = a * half[0] + c * half[1];
+        let scale = 2.0 * a.dot(h) / h.length_squared();
+        let c_hat = [scale * half[0] - 1.0, scale * half[1]];
 
         // Choose the direction on the arc from b to ĉ.
-        let drop = u1 * 0.5 * (c_hat - b).length_squared();
-        b * (1.0 - drop) + orthogonal_part(c_hat, b) * (drop * (2.0 - drop)).max(0.0).sqrt()
+        let w = 0.5 * (a * c_hat[0] + c * c_hat[1] - b).length_squared();
+        let drop = u1 * w;
+        let along = (u1 * (2.0 - drop) / (2.0 - w)).max(0.0).sqrt();
+        let weights = [along * c_hat[0], 1.0 - drop - along * (1.0 - w), along * c_hat[1]];
+        // Weights are those of unit vectors so far. Below zero they are by rounding.
+        std::array::from_fn(|i| (weights[i] * self.nearness[i]).max(0.0))
     }
-}
-
-/// The unit vector in the direction of the part of `v` orthogonal to the unit vector `axis`.
-fn orthogonal_part(v: DVec3, axis: DVec3) -> DVec3 {
-    (v - axis * v.dot(axis)).normalize_or_zero()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use proptest::prelude::*;
 
     use super::super::testing::{Points, check_sampling, random_vec3};
