@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use crate::grid::{Anchor, CellKey, Grid};
 use crate::pairs::{Lobe as PairLobe, Pairs};
-use crate::record::{PathRecord, Vertex};
+use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shrink::{Shrinkage, estimate};
-use crate::sums::{Deposit, Quantum};
+use crate::sums::{Deposit, LUMINANCE, Quantum};
 use crate::table::{CellIndex, PerCell, ShardedTable, Table};
 
 /// Settings. The defaults are measured, not derived.
@@ -167,7 +167,9 @@ impl Adaptive {
             })
             .collect();
         self.report.second_cells = self.second.iter_mut().map(|tree| tree.cells.len() as u64).sum();
-        self.second.iter_mut().for_each(|tree| tree.cells.clear());
+        if std::env::var_os("KEEP2").is_none() {
+            self.second.iter_mut().for_each(|tree| tree.cells.clear());
+        }
         suffixes
     }
 
@@ -207,7 +209,7 @@ fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &
     let mut places = vec![NO_CELL; records.len() * trees.len()];
     let deposits: Vec<Option<Deposit>> = records
         .iter()
-        .map(|record| quantum.deposit(record.suffix.get(), record.odd()).filter(|_| record.second.exists()))
+        .map(|record| quantum.deposit(record.suffix.get(), weight(record)).filter(|_| record.second.exists()))
         .collect();
     let mut batch = Vec::new();
     for (at, tree) in trees.iter().enumerate() {
@@ -225,6 +227,13 @@ fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &
         places.fill(NO_CELL);
     }
     places
+}
+
+/// What light at the second vertex counts for in the slot: as weights of the mean over a cell these keep its energy, for
+/// the sum of weight × mean is that of weight × own.
+fn weight(record: &PathRecord) -> f32 {
+    let through = |lobe: &Lobe| lobe.throughput.get() * lobe.transfer.get();
+    (through(&record.diffuse) + through(&record.glossy)).dot(LUMINANCE.as_vec3()).abs()
 }
 
 /// The first vertices of a part of a block, gathered in small tables before they go to the large ones: neighbouring
@@ -257,10 +266,9 @@ impl<'a> FirstVertices<'a> {
                 continue;
             }
             let bin = if kind == PairLobe::Glossy { record.first.bin() } else { 0 };
-            let cell =
-                self.quantum.deposit(incident, record.odd()).filter(|_| record.first.exists()).and_then(|deposit| {
-                    deposit_in_all(trees, &record.first, self.params.leaf, bin, record.sample(), &deposit)
-                });
+            let cell = self.quantum.deposit(incident, 1.0).filter(|_| record.first.exists()).and_then(|deposit| {
+                deposit_in_all(trees, &record.first, self.params.leaf, bin, record.sample(), &deposit)
+            });
             let throughput = lobe.throughput.get();
             match cell {
                 Some((tree, cell)) if pairs.add(record.slot, kind, tree, cell, throughput) => {}

@@ -62,14 +62,10 @@ impl CellKey {
         mix64(self.0 as u64 ^ mix64((self.0 >> 64) as u64))
     }
 
-    /// All bits, to be stored.
-    pub fn bits(self) -> u128 {
+    /// All bits.
+    #[cfg(test)]
+    fn bits(self) -> u128 {
         self.0
-    }
-
-    /// From [`Self::bits`].
-    pub fn from_bits(bits: u128) -> Self {
-        Self(bits)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::table::CellIndex;
 
 /// Which estimate a pair reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Lobe {
+pub(crate) enum Lobe {
     /// That of diffuse lobes.
     Diffuse,
     /// That of all others.
@@ -68,7 +68,7 @@ struct Own {
 
 /// All pairs of one part.
 #[derive(Debug, Default)]
-pub struct Pairs {
+pub(crate) struct Pairs {
     /// Sorted and without repetition up to `compact`, then as they came.
     pairs: Vec<Pair>,
     compact: usize,
@@ -135,11 +135,6 @@ impl Pairs {
     /// Number of pairs.
     pub fn len(&self) -> usize {
         self.pairs.len()
-    }
-
-    /// No pairs.
-    pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty()
     }
 
     /// Bytes held.

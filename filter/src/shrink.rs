@@ -16,7 +16,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::grid::CellKey;
-use crate::sums::{Quantum, WideSums};
+use crate::sums::{LUMINANCE, Quantum, WideSums};
 use crate::table::{CellIndex, PerCell, ShardedTable};
 
 /// How sure a difference between cells must be to be kept.
@@ -35,15 +35,21 @@ pub struct Shrinkage {
 /// Sums of a cell in floating point; order and grouping are fixed by the order of keys.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
+    /// Deposits.
     n: f64,
+    /// Σ weight.
+    weight: f64,
+    /// Σ weight · radiance.
     rgb: DVec3,
+    /// Σ weight · luminance².
     square: f64,
 }
 
 impl Moments {
     fn of(sums: &WideSums, quantum: &Quantum) -> Self {
         Self {
-            n: (sums.count[0] + sums.count[1]) as f64,
+            n: sums.count as f64,
+            weight: sums.weight as f64 * quantum.weight(),
             rgb: DVec3::from_array(sums.rgb.map(|x| x as f64)) * quantum.radiance(),
             square: sums.square as f64 * quantum.squared_radiance(),
         }
@@ -51,23 +57,24 @@ impl Moments {
 
     fn add(&mut self, other: &Self) {
         self.n += other.n;
+        self.weight += other.weight;
         self.rgb += other.rgb;
         self.square += other.square;
     }
 
     fn mean(&self) -> DVec3 {
-        self.rgb / self.n
+        self.rgb / self.weight
     }
 
     /// Mean luminance.
     fn luminance(&self) -> f64 {
-        self.rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722)) / self.n
+        self.rgb.dot(LUMINANCE) / self.weight
     }
 
-    /// Σ (y − ȳ)².
+    /// Σ weight (y − ȳ)².
     fn scatter(&self) -> f64 {
         let mean = self.luminance();
-        (self.square - self.n * mean * mean).max(0.0)
+        (self.square - self.weight * mean * mean).max(0.0)
     }
 }
 
@@ -175,7 +182,7 @@ fn kept(siblings: &[Node], parent: &Moments, shrinkage: &Shrinkage) -> f64 {
     for Node { moments, .. } in siblings {
         let difference = moments.luminance() - mean;
         within += moments.scatter();
-        between += moments.n * difference * difference;
+        between += moments.weight * difference * difference;
     }
     let freedom = parent.n - siblings.len() as f64;
     let variance = if freedom >= shrinkage.trusted { within / freedom } else { parent.scatter() / (parent.n - 1.0) };

@@ -1,12 +1,12 @@
 //! Sums in which no order can change a bit.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Radiance in whole numbers.
 ///
-/// A deposit is rounded to multiples of `unit` · 2⁻³⁰, its squared luminance to multiples of (`unit` · 2⁻¹⁸)². Rounding is
-/// to nearest and happens once per deposit; everything after it is exact, so sums are the same in any order and any
-/// grouping. A cell whose radiance is below `unit` · 2⁻³⁰ reads as black: `unit` should be near the mean.
+/// A deposit is rounded to multiples of `unit` · 2⁻³⁰, its squared luminance to multiples of (`unit` · 2⁻¹⁸)², its weight to
+/// multiples of 2⁻¹⁶. Rounding is to nearest and happens once per deposit; everything after it is exact, so sums are the
+/// same in any order and any grouping. Radiance below `unit` · 2⁻³¹ reads as black: `unit` should be near the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantum {
     rgb: f64,
@@ -15,12 +15,15 @@ pub struct Quantum {
 }
 
 /// The luminance of linear Rec.709, by which noise is judged.
-const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+pub const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
 const RGB_BITS: i32 = 30;
 const SQUARE_BITS: i32 = 36;
+const WEIGHT_BITS: i32 = 16;
 /// Deposits up to 2²⁰ units: their squares, 2⁴⁰⁺³⁶ quanta, need more than 64 bits and go to the wide sums.
 const LARGEST_BITS: i32 = 20;
+/// Largest weight; the smallest is a quantum, so that no deposit vanishes.
+const LARGEST_WEIGHT: f32 = 16.0;
 
 impl Quantum {
     /// For radiance of the order of `unit`, of which only the power of two counts.
@@ -34,21 +37,26 @@ impl Quantum {
         }
     }
 
-    /// One deposit. `None` for what is not finite, negative, subnormal, or above 2²⁰ units: no cell may take it.
+    /// One deposit, of a weight that is cut to [2⁻¹⁶, 16]. `None` for radiance that is not finite, negative, subnormal, or
+    /// above 2²⁰ units: no cell may take it.
     #[inline]
-    pub fn deposit(&self, radiance: Vec3, odd: bool) -> Option<Deposit> {
+    pub fn deposit(&self, radiance: Vec3, weight: f32) -> Option<Deposit> {
         let within = radiance.min_element() >= 0.0 && radiance.max_element() <= self.largest;
         // NaN fails the first comparison or, where another channel wins the minimum, this one.
         if !within || !radiance.is_finite() || radiance.to_array().iter().any(|x| x.is_subnormal()) {
             return None;
         }
-        let luminance = f64::from(radiance.dot(LUMINANCE));
-        let whole = |x: f64| (x + 0.5) as i64;
+        const QUANTA: f32 = (1 << WEIGHT_BITS) as f32;
+        // A weight that is not a number becomes the smallest.
+        let weight = (weight * QUANTA).max(1.0).min(LARGEST_WEIGHT * QUANTA).round();
+        let share = f64::from(weight / QUANTA);
+        let radiance = radiance.as_dvec3();
+        let luminance = radiance.dot(LUMINANCE);
+        let whole = |x: f64| (x + 0.5) as u64;
         Some(Deposit {
-            rgb: radiance.as_dvec3().to_array().map(|x| whole(x * self.rgb)),
-            luminance: whole(luminance * self.rgb),
-            square: (luminance * luminance * self.square + 0.5) as u128,
-            odd,
+            weight: weight as u64,
+            rgb: (radiance * (self.rgb * share)).to_array().map(whole),
+            square: (luminance * luminance * self.square * share + 0.5) as u128,
         })
     }
 
@@ -61,40 +69,44 @@ impl Quantum {
     pub fn squared_radiance(&self) -> f64 {
         self.square.recip()
     }
+
+    /// Weight per quantum of a sum of weights.
+    pub fn weight(&self) -> f64 {
+        2f64.powi(-WEIGHT_BITS)
+    }
 }
 
 /// What one path brings to a cell, in quanta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deposit {
-    rgb: [i64; 3],
-    luminance: i64,
+    weight: u64,
+    rgb: [u64; 3],
     square: u128,
-    odd: bool,
 }
 
 /// The sums of a cell, 48 bytes. What does not fit is handed to [`WideSums`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sums {
-    /// Deposits of even and of odd samples.
-    count: [u32; 2],
-    /// Σ radiance.
-    rgb: [i64; 3],
-    /// Σ luminance of odd samples.
-    odd: i64,
-    /// Σ luminance².
+    /// Deposits.
+    count: u64,
+    /// Σ weight.
+    weight: u64,
+    /// Σ weight · radiance.
+    rgb: [u64; 3],
+    /// Σ weight · luminance².
     square: u64,
 }
 
-/// The same sums without a limit: 2⁶⁴ of the largest deposits fit.
+/// The same sums without a limit: 2⁴⁰ of the largest deposits fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WideSums {
-    /// Deposits of even and of odd samples.
-    pub count: [u64; 2],
-    /// Σ radiance.
-    pub rgb: [i128; 3],
-    /// Σ luminance of odd samples.
-    pub odd: i128,
-    /// Σ luminance².
+    /// Deposits.
+    pub count: u64,
+    /// Σ weight.
+    pub weight: u64,
+    /// Σ weight · radiance.
+    pub rgb: [u128; 3],
+    /// Σ weight · luminance².
     pub square: u128,
 }
 
@@ -104,67 +116,52 @@ impl Sums {
     #[must_use]
     pub fn add(&mut self, deposit: &Deposit) -> bool {
         let Ok(square) = u64::try_from(deposit.square) else { return false };
-        let one = Self {
-            count: [u32::from(!deposit.odd), u32::from(deposit.odd)],
-            rgb: deposit.rgb,
-            odd: if deposit.odd { deposit.luminance } else { 0 },
-            square,
-        };
-        self.merge(&one)
+        self.merge(&Self { count: 1, weight: deposit.weight, rgb: deposit.rgb, square })
     }
 
     /// Adds other sums; false, and unchanged, if they do not fit.
     #[inline]
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
-        let sum = || {
-            Some(Self {
-                count: [self.count[0].checked_add(other.count[0])?, self.count[1].checked_add(other.count[1])?],
-                rgb: [
-                    self.rgb[0].checked_add(other.rgb[0])?,
-                    self.rgb[1].checked_add(other.rgb[1])?,
-                    self.rgb[2].checked_add(other.rgb[2])?,
-                ],
-                odd: self.odd.checked_add(other.odd)?,
-                square: self.square.checked_add(other.square)?,
-            })
-        };
-        let Some(sum) = sum() else { return false };
-        *self = sum;
+        let (a, b) = (self.to_array(), other.to_array());
+        let sum: [u64; 6] = std::array::from_fn(|i| a[i].wrapping_add(b[i]));
+        // A sum that wrapped is less than its terms.
+        if (0..6).any(|i| sum[i] < a[i]) {
+            return false;
+        }
+        let [count, weight, r, g, b, square] = sum;
+        *self = Self { count, weight, rgb: [r, g, b], square };
         true
+    }
+
+    #[inline]
+    fn to_array(self) -> [u64; 6] {
+        [self.count, self.weight, self.rgb[0], self.rgb[1], self.rgb[2], self.square]
     }
 }
 
 impl WideSums {
     /// Adds a deposit.
     pub fn add(&mut self, deposit: &Deposit) {
-        self.count[usize::from(deposit.odd)] += 1;
-        for (sum, x) in self.rgb.iter_mut().zip(deposit.rgb) {
-            *sum += i128::from(x);
-        }
-        self.odd += if deposit.odd { i128::from(deposit.luminance) } else { 0 };
-        self.square += deposit.square;
+        let rgb = deposit.rgb.map(u128::from);
+        self.merge(&Self { count: 1, weight: deposit.weight, rgb, square: deposit.square });
     }
 
     /// Adds other sums.
     pub fn merge(&mut self, other: &Self) {
-        self.count = [self.count[0] + other.count[0], self.count[1] + other.count[1]];
+        self.count += other.count;
+        self.weight += other.weight;
         for (sum, x) in self.rgb.iter_mut().zip(other.rgb) {
             *sum += x;
         }
-        self.odd += other.odd;
         self.square += other.square;
     }
 }
 
 impl From<&Sums> for WideSums {
     fn from(sums: &Sums) -> Self {
-        Self {
-            count: sums.count.map(u64::from),
-            rgb: sums.rgb.map(i128::from),
-            odd: sums.odd.into(),
-            square: sums.square.into(),
-        }
+        let Sums { count, weight, rgb, square } = *sums;
+        Self { count, weight, rgb: rgb.map(u128::from), square: square.into() }
     }
 }
 
@@ -181,36 +178,37 @@ mod tests {
             for channel in 0..3 {
                 let mut rgb = [1.0; 3];
                 rgb[channel] = bad;
-                assert_eq!(quantum.deposit(Vec3::from_array(rgb), false), None, "{bad} in channel {channel}");
+                assert_eq!(quantum.deposit(Vec3::from_array(rgb), 1.0), None, "{bad} in channel {channel}");
             }
         }
-        assert!(quantum.deposit(Vec3::ZERO, false).is_some());
+        assert!(quantum.deposit(Vec3::ZERO, 1.0).is_some());
     }
 
     #[test]
     fn two_to_the_33_of_the_largest_deposits_are_summed_exactly() {
         let quantum = Quantum::new(1.0);
-        let deposit = quantum.deposit(Vec3::splat(1_048_576.0), true).unwrap();
+        let deposit = quantum.deposit(Vec3::splat(1_048_576.0), 16.0).unwrap();
         let mut wide = WideSums::default();
         wide.add(&deposit);
         for _ in 0..33 {
             let copy = wide;
             wide.merge(&copy);
         }
-        assert_eq!(wide.count, [0, 1 << 33]);
-        assert_eq!(wide.rgb, [i128::from(deposit.rgb[0]) << 33; 3]);
+        assert_eq!(wide.count, 1 << 33);
+        assert_eq!(wide.weight, deposit.weight << 33);
+        assert_eq!(wide.rgb, [u128::from(deposit.rgb[0]) << 33; 3]);
         assert_eq!(wide.square, deposit.square << 33);
     }
 
     #[test]
     fn sums_that_do_not_fit_are_left_alone() {
         let quantum = Quantum::new(1.0);
-        let deposit = quantum.deposit(Vec3::splat(10_000.0), false).unwrap();
+        let deposit = quantum.deposit(Vec3::splat(10_000.0), 1.0).unwrap();
         let (mut sums, mut accepted) = (Sums::default(), 0u64);
         while sums.add(&deposit) {
             accepted += 1;
         }
-        assert_eq!(u64::from(sums.count[0]), accepted);
+        assert_eq!(sums.count, accepted);
         assert!(accepted > 0);
         let before = sums;
         let copy = sums;
@@ -223,7 +221,7 @@ mod tests {
         fn no_order_or_grouping_changes_a_bit(values in prop::collection::vec(0.0f32..1e4, 1..40), cut in 0usize..40) {
             let quantum = Quantum::new(0.25);
             let deposits: Vec<Deposit> =
-                values.iter().enumerate().map(|(i, &x)| quantum.deposit(Vec3::new(x, 1.0, x / 3.0), i % 2 == 1).unwrap()).collect();
+                values.iter().enumerate().map(|(i, &x)| quantum.deposit(Vec3::new(x, 1.0, x / 3.0), i as f32 / 7.0).unwrap()).collect();
             let sum = |deposits: &[Deposit]| deposits.iter().fold(WideSums::default(), |mut sum, d| { sum.add(d); sum });
             let (a, b) = deposits.split_at(cut.min(deposits.len()));
             let mut grouped = sum(b);
@@ -234,7 +232,7 @@ mod tests {
         #[test]
         fn deposits_are_rounded_to_their_quantum(x in 0.0f32..1000.0) {
             let quantum = Quantum::new(1.0);
-            let deposit = quantum.deposit(Vec3::splat(x), false).unwrap();
+            let deposit = quantum.deposit(Vec3::splat(x), 1.0).unwrap();
             let error = deposit.rgb[0] as f64 * quantum.radiance() - f64::from(x);
             prop_assert!(error.abs() <= 0.5 * quantum.radiance());
         }

@@ -8,7 +8,7 @@ use crate::sums::{Deposit, Sums, WideSums};
 
 /// A cell: 64 bytes, a cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Cell {
+pub(crate) struct Cell {
     key: CellKey,
     sums: Sums,
 }
@@ -16,7 +16,7 @@ pub struct Cell {
 /// Cells found by key: open addressing with linear probing over full keys. It grows, so no cell is ever refused, and
 /// nothing depends on who came first but the cells' numbers, which no result may depend on.
 #[derive(Debug, Default)]
-pub struct Table {
+pub(crate) struct Table {
     /// Number of the cell plus one, 0 for none; a power of two of slots, at most half of them taken.
     slots: Vec<u32>,
     cells: Vec<Cell>,
@@ -93,11 +93,6 @@ impl Table {
         self.cells.len()
     }
 
-    /// No cells.
-    pub fn is_empty(&self) -> bool {
-        self.cells.is_empty()
-    }
-
     /// All cells with their sums, in the order of their numbers.
     pub fn cells(&self) -> impl Iterator<Item = (CellKey, WideSums)> + '_ {
         self.cells.iter().zip(0u32..).map(|(cell, number)| {
@@ -124,17 +119,17 @@ impl Table {
 
 /// A table that threads add to at once: shards by the upper bits of the hash, each behind a lock that is held for a batch.
 #[derive(Debug)]
-pub struct ShardedTable {
+pub(crate) struct ShardedTable {
     shards: Vec<Mutex<Table>>,
 }
 
 /// Where a cell is: shard in the lower bits, number above.
-pub type CellIndex = u32;
+pub(crate) type CellIndex = u32;
 
 const SHARD_BITS: u32 = 6;
 
 /// Number of shards: enough that a few dozen threads seldom meet, few enough that a batch per shard is worth a lock.
-pub const SHARDS: usize = 1 << SHARD_BITS;
+const SHARDS: usize = 1 << SHARD_BITS;
 
 #[inline]
 fn shard_of(key: CellKey) -> usize {
@@ -214,11 +209,6 @@ impl ShardedTable {
         self.tables().map(|table| table.len()).sum()
     }
 
-    /// No cells.
-    pub fn is_empty(&mut self) -> bool {
-        self.len() == 0
-    }
-
     /// Forgets all cells, and keeps the memory.
     pub fn clear(&mut self) {
         self.tables().for_each(Table::clear);
@@ -236,7 +226,7 @@ impl ShardedTable {
 
 /// A value per cell of a [`ShardedTable`].
 #[derive(Debug, Default)]
-pub struct PerCell<T> {
+pub(crate) struct PerCell<T> {
     shards: Vec<Vec<T>>,
 }
 

@@ -11,6 +11,7 @@ use std::ops::Range;
 use filter::{Adaptive, Anchor, PathRecord, Resolved};
 use glam::Vec3;
 
+pub use blend::Blend;
 pub use tile::{Keep, Keeper, Nothing, Paths};
 
 use crate::film::Film;
@@ -24,12 +25,13 @@ pub enum Filtering {
     #[default]
     None,
     /// By cells as fine as the samples can tell apart.
-    Adaptive(filter::Params),
+    Adaptive(filter::Params, Blend),
 }
 
 /// A frame's filter.
 pub struct FrameFilter {
     adaptive: Adaptive,
+    blend: Blend,
     block: u64,
 }
 
@@ -42,12 +44,12 @@ const BLOCK_SPP: u64 = 64;
 
 impl FrameFilter {
     /// A filter for `film`, which keeps split sums. `unit`: radiance of the order of the mean.
-    pub fn new(params: &filter::Params, world: &World, film: &mut Film, unit: f32) -> Self {
+    pub fn new(params: &filter::Params, blend: &Blend, world: &World, film: &mut Film, unit: f32) -> Self {
         let (low, high) = world.geometry.bounds();
         let anchor = Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) };
         let params = filter::Params { unit, ..*params };
         let adaptive = Adaptive::new(&params, &anchor, film.tiles().len());
-        Self { adaptive, block: block_spp(film.bounds().area()) }
+        Self { adaptive, blend: *blend, block: block_spp(film.bounds().area()) }
     }
 
     /// Cuts a range of samples into blocks. Borders are multiples of the block's length, so that ranges that begin and
@@ -78,7 +80,7 @@ impl FrameFilter {
             width: bounds.width() as usize,
             pixels: bounds.pixels().map(|at| blend::Pixel::new(film, at, &resolved[film.index(at)], expose)).collect(),
         };
-        let values: Vec<Rgb> = frame.blend();
+        let values: Vec<Rgb> = frame.blend(&self.blend);
         film.set_filtered(&values);
         self.adaptive.report()
     }

@@ -303,10 +303,10 @@ fn trace_queries<Q: Queries + Sync>(
                 }
             }
         }
-        Filtering::Adaptive(params) => {
+        Filtering::Adaptive(params, blend) => {
             let unit = passes.unit();
             passes.film = passes.film.with_split();
-            let mut filter = FrameFilter::new(params, world, &mut passes.film, unit);
+            let mut filter = FrameFilter::new(params, blend, world, &mut passes.film, unit);
             let mut seconds = 0.0;
             for pass in filter.blocks(&asked) {
                 let (counters, paths) = passes.trace::<Paths>(&pass);
@@ -424,17 +424,18 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
             if camera.is_none() {
                 counters.camera_rays += 1;
             }
-            let (mut radiance, mut exposure) = world.sensor.expose(sample.radiance);
+            let (mut exposed, mut exposure) = world.sensor.expose(sample.radiance);
             // A sensor's response may leave its gamut: negative is rejected only as radiance.
-            if !radiance.is_finite() || sample.radiance.min_element() < 0.0 {
+            if !exposed.is_finite() || sample.radiance.min_element() < 0.0 {
                 counters.rejected_samples += 1;
-                (radiance, exposure) = (glam::Vec3::ZERO, 0.0);
+                (exposed, exposure) = (glam::Vec3::ZERO, 0.0);
                 recorder = K::Recorder::default();
-                sample.radiance = radiance;
+                sample.radiance = exposed;
             }
-            pixel.add(radiance, sample.alpha, offset.weight);
+            pixel.add(exposed, sample.alpha, offset.weight);
             let split = split.as_deref_mut();
-            keeper.keep(&recorder, Keep { slot, index, radiance, weight: offset.weight, exposure, split });
+            let radiance = sample.radiance;
+            keeper.keep(&recorder, Keep { slot, index, radiance, exposed, weight: offset.weight, exposure, split });
             if let Some(auxiliary) = auxiliary.as_deref_mut().filter(|_| sample.alpha > 0.0) {
                 auxiliary.add(&sample.first);
             }

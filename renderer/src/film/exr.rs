@@ -102,7 +102,7 @@ pub fn publish(part: &Path, path: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::AovSet;
+    use super::super::{AovSet, TilePixel};
     use super::*;
     use crate::math::Rgb;
     use crate::world::Bounds;
@@ -113,7 +113,8 @@ mod tests {
         let path = folder.path().join("a.exr");
         let bounds = Bounds { min: [2, 1], max: [5, 3] };
         let mut film = Film::new([8, 4], bounds, AovSet { sample_count: true, ..AovSet::default() });
-        film.tiles()[0].for_each(|[x, y], pixel, _| pixel.add(Rgb::new(x as f32, y as f32, 0.25), 1.0, 1.0));
+        film.tiles()[0]
+            .for_each(|TilePixel { at: [x, y], pixel, .. }| pixel.add(Rgb::new(x as f32, y as f32, 0.25), 1.0, 1.0));
         let attributes = vec![("tessera/seed".to_owned(), Attribute::Text("7".into()))];
         write(&film, attributes.clone(), &path).unwrap();
         let image = oiio::read(&path).unwrap();

@@ -1,13 +1,13 @@
-//! Filtered or not: decided by how far the two are apart, against what noise explains.
+//! Filtered or not: decided by what the samples say of the filter's error, against the noise of the unfiltered image.
 //!
-//! Wherever the filtered image differs from the unfiltered one by more than the latter's noise, the difference is bias,
-//! and the unfiltered value takes its share: with the difference D² and the noise's variance V, both over a window,
-//! w = max(0, 1 − κ V / D²) of it. As samples grow V vanishes and w goes to 1 unless D² vanishes too.
+//! Even and odd samples make two independent unfiltered images A and B. With F the filtered one, (F − A)(F − B) estimates
+//! the squared error of F without bias, whatever the sampler's stratification, and (A − B)²/4 that of their mean, the
+//! unfiltered image U. Over a window the first has a mean b and a standard error s. Only what is certain speaks against
+//! the filter: with b' = max(0, b − c s), the result is F + w (U − F), w = b' / (b' + V), which minimises the error of the sum
+//! of independent estimates. As samples grow V vanishes, and w goes to 1 wherever F is wrong.
 //!
-//! V is measured between even and odd samples, which are two independent halves: their squared difference over 4
-//! estimates the variance of their mean without bias, whatever the sampler's stratification.
-//!
-//! **Source**: the positive-part estimator of James and Stein \[James61\]; as an image-space combiner \[Zheng22\].
+//! **Source**: the combiner of James and Stein \[James61\], \[Zheng22\] in its form for two halves, which is 1 − V/D with
+//! D = b + V; the standard error is ours, against the heavy tails of path tracing.
 
 use filter::Resolved;
 use glam::Vec3;
@@ -40,14 +40,23 @@ pub struct Frame {
     pub pixels: Vec<Pixel>,
 }
 
-/// Half the side of the windows over which noise and difference are measured: of the 25 pixels each gives one degree of
-/// freedom to the variance.
-const RADIUS: usize = 2;
+/// When the unfiltered image is believed. The defaults are measured, not derived.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Half the side of the windows over which noise and difference are measured: of a window's pixels each gives one
+    /// degree of freedom to the variance.
+    pub radius: usize,
+    /// c for the glossy part.
+    pub glossy_doubt: f32,
+    /// c for the whole.
+    pub doubt: f32,
+}
 
-/// κ for the glossy part.
-const GLOSSY_DOUBT: f32 = 1.0;
-/// κ for the whole.
-const DOUBT: f32 = 1.5;
+impl Default for Blend {
+    fn default() -> Self {
+        Self { radius: 3, glossy_doubt: 1.0, doubt: 2.0 }
+    }
+}
 
 impl Pixel {
     /// Gathers a pixel from its film and its filter.
@@ -73,58 +82,64 @@ impl Pixel {
 
 impl Frame {
     /// The blended image.
-    pub fn blend(&self) -> Vec<Rgb> {
+    pub fn blend(&self, settings: &Blend) -> Vec<Rgb> {
         let mean = self.pixels.iter().map(|pixel| luminance(pixel.own)).sum::<f32>() / self.pixels.len().max(1) as f32;
         // Errors count relative to brightness, as eyes see them, down to a tenth of the mean.
         let scale = |pixel: &Pixel| {
             (luminance(pixel.base + pixel.glossy).powi(2) + 0.01 * mean * mean).max(f32::MIN_POSITIVE).recip()
         };
-        let glossy = self.weights(GLOSSY_DOUBT, |pixel| {
+        let glossy = weights(&self.pixels, self.width, settings.glossy_doubt, settings.radius, |pixel| {
             pixel.own_noise.map(|_| (pixel.glossy_noise, pixel.glossy_own - pixel.glossy, scale(pixel)))
         });
         let filtered: Vec<Vec3> = (self.pixels.iter().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
         let indexed: Vec<(Pixel, Vec3)> = self.pixels.iter().copied().zip(filtered.iter().copied()).collect();
-        let whole = weights(&indexed, self.width, DOUBT, |(pixel, filtered)| {
+        let whole = weights(&indexed, self.width, settings.doubt, settings.radius, |(pixel, filtered)| {
             pixel.own_noise.map(|noise| (noise, pixel.own - *filtered, scale(pixel)))
         });
         indexed.iter().zip(whole).map(|((pixel, filtered), w)| *filtered + w * (pixel.own - *filtered)).collect()
-    }
-
-    fn weights(&self, doubt: f32, measure: impl Fn(&Pixel) -> Option<(Vec3, Vec3, f32)>) -> Vec<f32> {
-        weights(&self.pixels, self.width, doubt, measure)
     }
 }
 
 /// The unfiltered value's share for each pixel. `measure` tells a pixel's noise, its difference and their scale; `None`
 /// where noise is not known, which leaves the filter alone.
-fn weights<T>(pixels: &[T], width: usize, doubt: f32, measure: impl Fn(&T) -> Option<(Vec3, Vec3, f32)>) -> Vec<f32> {
-    let measured: Vec<[f32; 2]> = pixels
+fn weights<T>(
+    pixels: &[T],
+    width: usize,
+    doubt: f32,
+    radius: usize,
+    measure: impl Fn(&T) -> Option<(Vec3, Vec3, f32)>,
+) -> Vec<f32> {
+    let measured: Vec<[f32; 4]> = pixels
         .iter()
-        .map(|pixel| match measure(pixel) {
-            Some((noise, difference, scale)) => [noise.length_squared() * scale, difference.length_squared() * scale],
-            None => [f32::INFINITY, 0.0],
+        .map(|pixel| {
+            let Some((noise, difference, scale)) = measure(pixel) else { return [0.0, 0.0, 0.0, 1.0] };
+            // (F − A)(F − B) with A and B at U ± noise.
+            let variance = noise.length_squared() * scale;
+            let error = difference.length_squared() * scale - variance;
+            [error, error * error, variance, 1.0]
         })
         .collect();
-    let sums = windows(&measured, width);
-    let share = |&[noise, difference]: &[f32; 2]| {
-        if difference > doubt * noise { 1.0 - doubt * noise / difference } else { 0.0 }
+    let share = |&[errors, squares, variances, n]: &[f32; 4]| {
+        let (error, variance) = (errors / n, variances / n);
+        let standard_error = ((squares / n - error * error) / n).max(0.0).sqrt();
+        let certain = error - doubt * standard_error;
+        if certain > 0.0 { certain / (certain + variance) } else { 0.0 }
     };
-    sums.iter().map(share).collect()
+    windows(&measured, width, radius).iter().map(share).collect()
 }
 
 /// Sums over windows, smaller at the borders.
-fn windows(values: &[[f32; 2]], width: usize) -> Vec<[f32; 2]> {
+fn windows<const N: usize>(values: &[[f32; N]], width: usize, radius: usize) -> Vec<[f32; N]> {
     let height = values.len() / width.max(1);
-    let near = |at: usize, size: usize| at.saturating_sub(RADIUS)..(at + RADIUS + 1).min(size);
-    let sum = |a: [f32; 2], b: &[f32; 2]| [a[0] + b[0], a[1] + b[1]];
-    let rows: Vec<[f32; 2]> = (0..values.len())
-        .map(|i| near(i % width, width).map(|x| &values[i / width * width + x]).fold([0.0; 2], sum))
+    let near = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
+    let sum = |a: [f32; N], b: &[f32; N]| std::array::from_fn(|i| a[i] + b[i]);
+    let rows: Vec<[f32; N]> = (0..values.len())
+        .map(|i| near(i % width, width).map(|x| &values[i / width * width + x]).fold([0.0; N], sum))
         .collect();
-    (0..values.len())
-        .map(|i| near(i / width, height).map(|y| &rows[y * width + i % width]).fold([0.0; 2], sum))
-        .collect()
+    let columns = |i: usize| near(i / width, height).map(move |y| y * width + i % width);
+    (0..values.len()).map(|i| columns(i).map(|at| &rows[at]).fold([0.0; N], sum)).collect()
 }
 
 fn luminance(rgb: Vec3) -> f32 {

@@ -20,8 +20,10 @@ pub struct Keep<'a> {
     pub slot: u32,
     /// The path's number within the pixel.
     pub index: u64,
-    /// Film RGB.
+    /// Along the camera ray, scene RGB.
     pub radiance: Rgb,
+    /// The same as the sensor takes it, film RGB.
+    pub exposed: Rgb,
     /// Of the pixel filter.
     pub weight: f32,
     /// Share of the radiance that the sensor takes.
@@ -50,7 +52,7 @@ impl Keeper for Paths {
     fn keep(&mut self, cut: &Cut, sample: Keep<'_>) {
         self.0.extend(cut.record(sample.slot, sample.index, sample.weight * sample.exposure));
         if let Some(split) = sample.split {
-            split.add(sample.index, sample.radiance, cut.prefix() * sample.exposure, sample.weight);
+            split.add(sample.index, sample.exposed, cut.prefix() * sample.exposure, sample.weight);
         }
     }
 }

@@ -18,18 +18,21 @@ impl Sampler {
 
     /// The numbers of one sample of one pixel, which is one path.
     ///
-    /// Any `sample` is valid. Each aligned block of 2³² samples is a stratified set of its own.
+    /// Any `sample` is valid. Even and odd samples are two sequences with scrambles of their own, so that they are
+    /// independent halves whose difference tells the error of their mean. Each aligned block of 2³³ samples is two stratified
+    /// sets of its own.
     #[inline]
     pub fn pixel_sample(&self, pixel: [u32; 2], sample: u64) -> Numbers {
         let pixel_key = mix64(self.key ^ (u64::from(pixel[1]) << 32 | u64::from(pixel[0])));
-        let key = mix64(pixel_key ^ (sample >> 32));
-        Numbers { key, reversed_index: (sample as u32).reverse_bits() }
+        let (half, index) = (sample & 1, sample >> 1);
+        let key = mix64(pixel_key ^ (index >> 32 << 1 | half));
+        Numbers { key, reversed_index: (index as u32).reverse_bits() }
     }
 }
 
 /// The uniform numbers of one path: a pure function of the dimension asked for.
 ///
-/// For one pixel, the first 2ᵏ samples, and each further aligned block of 2ᵏ, are stratified in every elementary interval
+/// For one pixel, the first 2ᵏ even samples, and each further aligned 2ᵏ of them, and likewise the odd ones, are stratified in every elementary interval
 /// of area 2⁻ᵏ of each pair. Different dimensions are independent, by an Owen-shuffled index and Owen-scrambled digits
 /// of their own. A dimension is meant to be asked for one pair or one number.
 ///

@@ -9,7 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
-use renderer::filtering::Filtering;
+use renderer::filtering::{Blend, Filtering};
 use renderer::render::{self, Frame, Job, Unobserved};
 use tests::error::Errors;
 use tests::image::{RgbImage, read_exr};
@@ -24,6 +24,7 @@ fn main() -> Result<(), Failure> {
     let (width, height) = resolution.split_once('x').ok_or("the resolution is WIDTHxHEIGHT")?;
     let resolution = Some([width.parse()?, height.parse()?]);
     let (mut params, mut seed, mut out) = (filter::Params::default(), 1, None);
+    let mut blend = Blend::default();
     for setting in settings {
         let (key, value) = setting.split_once('=').ok_or("settings are KEY=VALUE")?;
         match key {
@@ -33,6 +34,9 @@ fn main() -> Result<(), Failure> {
             "second_trees" => params.second_trees = value.parse()?,
             "leaf" => params.leaf = value.parse()?,
             "second_leaf" => params.second_leaf = value.parse()?,
+            "radius" => blend.radius = value.parse()?,
+            "doubt" => blend.doubt = value.parse()?,
+            "glossy_doubt" => blend.glossy_doubt = value.parse()?,
             "tau" => params.shrinkage.tau = value.parse()?,
             "trusted" => params.shrinkage.trusted = value.parse()?,
             "levels" => params.shrinkage.levels = value.parse()?,
@@ -43,7 +47,7 @@ fn main() -> Result<(), Failure> {
     for spp in spps.split(',') {
         let spp: u64 = spp.parse()?;
         let mut plain = None;
-        for (name, filtering) in [("none", Filtering::None), ("adaptive", Filtering::Adaptive(params))] {
+        for (name, filtering) in [("none", Filtering::None), ("adaptive", Filtering::Adaptive(params, blend))] {
             let job = Job {
                 scene: PathBuf::from(scene),
                 spp: Some(spp),
