@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::grid::{Anchor, CellKey, Grid};
+use crate::grid::{Anchor, Grid, Place};
 use crate::pairs::{Lobe as PairLobe, Pairs};
 use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shrink::{Shrinkage, estimate};
@@ -31,9 +31,9 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             trees: 4,
-            second_trees: 2,
+            second_trees: 1,
             leaf: 2.0,
-            second_leaf: 4.0,
+            second_leaf: 8.0,
             shrinkage: Shrinkage { tau: 2.5, trusted: 24.0, levels: 5 },
             unit: 1.0,
         }
@@ -79,13 +79,13 @@ impl Tree {
     fn several(anchor: &Anchor, count: u32) -> Vec<Self> {
         (0..count).map(|index| Self { grid: Grid::new(anchor, index, count), cells: ShardedTable::default() }).collect()
     }
+}
 
-    /// The finest cell for a vertex.
-    #[inline]
-    fn leaf(&self, vertex: &Vertex, side: f32, bin: u8) -> Option<CellKey> {
-        let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
-        self.grid.leaf(vertex.p, vertex.n.get(), side * vertex.footprint.get(), attributes)
-    }
+/// A vertex as grids see it, with finest cells of `side` footprints.
+#[inline]
+fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
+    let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
+    Place::new(vertex.p, vertex.n.get(), side * vertex.footprint.get(), attributes)
 }
 
 /// Sums over all paths so far.
@@ -115,33 +115,41 @@ impl Adaptive {
         }
     }
 
+    /// Forgets what second vertices shared: those of the blocks to come share among themselves. What sets of blocks share
+    /// decides the result, so a frame that is rendered in ranges must be cut where the ranges are.
+    pub fn begin_epoch(&mut self) {
+        self.second.iter_mut().for_each(|tree| tree.cells.clear());
+    }
+
     /// Adds a block of paths, by part. A slot belongs to one part for good.
     ///
-    /// Second vertices share within the block: what a block is decides the result, who traces it does not.
+    /// Second vertices share with those of the block and of all blocks before it in the epoch.
     ///
     /// # Panics
     /// If there are not as many parts as were announced.
     pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
         assert_eq!(parts.len(), self.pairs.len(), "parts of a block");
         let suffixes = self.suffixes(parts);
-        let counts: Vec<(u64, u64)> = (&mut self.pairs, parts, &suffixes)
+        let unfiltered: Vec<u64> = (&mut self.pairs, parts, &suffixes)
             .into_par_iter()
-            .map(|(pairs, records, suffixes)| {
-                let mut block = FirstVertices::new(&self.params, &self.quantum, &self.diffuse, &self.glossy);
-                for (record, &suffix) in records.iter().zip(suffixes) {
-                    block.add(record, suffix, pairs);
-                }
-                block.finish(pairs)
-            })
+            .map_init(
+                || FirstVertices::new(&self.params, &self.quantum, &self.diffuse, &self.glossy),
+                |block, (pairs, records, suffixes)| {
+                    for (record, &suffix) in records.iter().zip(suffixes) {
+                        block.add(record, suffix, pairs);
+                    }
+                    block.finish(pairs)
+                },
+            )
             .collect();
         self.report.paths += parts.iter().map(|records| records.len() as u64).sum::<u64>();
-        self.report.unfiltered += counts.iter().map(|(_, unfiltered)| unfiltered).sum::<u64>();
+        self.report.unfiltered += unfiltered.iter().sum::<u64>();
     }
 
     /// What arrives at the second vertex of each path, filtered over the block.
     fn suffixes(&mut self, parts: &[Vec<PathRecord>]) -> Vec<Vec<Vec3>> {
         let trees = &self.second;
-        let places: Vec<Vec<CellIndex>> = parts
+        let places: Vec<Vec<Option<CellIndex>>> = parts
             .par_iter()
             .map(|records| second_vertices(records, trees, self.params.second_leaf, &self.quantum))
             .collect();
@@ -150,26 +158,24 @@ impl Adaptive {
             .par_iter_mut()
             .map(|tree| estimate(&mut tree.cells, &self.quantum, &self.params.shrinkage))
             .collect();
-        let count = self.second.len();
-        let read = |places: &[CellIndex], own: Vec3| match places[0] {
-            NO_CELL => own,
-            _ => {
-                let values = places.iter().zip(&estimates).map(|(&place, tree)| Vec3::from_array(tree.get(place)));
-                values.sum::<Vec3>() / count as f32
-            }
-        };
+        let share = (estimates.len() as f32).recip();
         let suffixes = parts
             .par_iter()
             .zip(&places)
             .map(|(records, places)| {
-                let pairs = records.iter().zip(places.chunks_exact(count));
-                pairs.map(|(record, places)| read(places, record.suffix.get())).collect()
+                let read = |(i, record): (usize, &PathRecord)| {
+                    let mut mean = Vec3::ZERO;
+                    for (tree, places) in estimates.iter().zip(places.chunks_exact(records.len())) {
+                        // A vertex that no cell took keeps its own light.
+                        let Some(place) = places[i] else { return record.suffix.get() };
+                        mean += Vec3::from_array(tree.get(place));
+                    }
+                    mean * share
+                };
+                records.iter().enumerate().map(read).collect()
             })
             .collect();
         self.report.second_cells = self.second.iter_mut().map(|tree| tree.cells.len() as u64).sum();
-        if std::env::var_os("KEEP2").is_none() {
-            self.second.iter_mut().for_each(|tree| tree.cells.clear());
-        }
         suffixes
     }
 
@@ -201,30 +207,24 @@ impl Adaptive {
     }
 }
 
-/// In place of a cell's index: the path keeps its own.
-const NO_CELL: CellIndex = CellIndex::MAX;
-
-/// Deposits the second vertices of a part; places of the cells, by record and tree.
-fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Vec<CellIndex> {
-    let mut places = vec![NO_CELL; records.len() * trees.len()];
-    let deposits: Vec<Option<Deposit>> = records
+/// Deposits the second vertices of a part; places of the cells, tree by tree.
+fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Vec<Option<CellIndex>> {
+    let mut places = vec![None; records.len() * trees.len()];
+    let deposits: Vec<Option<(Place, Deposit)>> = records
         .iter()
-        .map(|record| quantum.deposit(record.suffix.get(), weight(record)).filter(|_| record.second.exists()))
+        .map(|record| {
+            let deposit = quantum.deposit(record.suffix.get(), weight(record))?;
+            record.second.exists().then(|| (place(&record.second, side, 0), deposit))
+        })
         .collect();
-    let mut batch = Vec::new();
-    for (at, tree) in trees.iter().enumerate() {
-        batch.clear();
-        for (i, (record, deposit)) in records.iter().zip(&deposits).enumerate() {
-            let Some(deposit) = deposit else { continue };
-            if let Some(key) = tree.leaf(&record.second, side, 0) {
-                batch.push((key, *deposit, (i * trees.len() + at) as u32));
-            }
-        }
-        tree.cells.add(&mut batch, &mut places);
-    }
-    // A vertex too far away for one tree's cells stays out of all.
-    for places in places.chunks_exact_mut(trees.len()).filter(|places| places.contains(&NO_CELL)) {
-        places.fill(NO_CELL);
+    let mut keyed = Vec::with_capacity(records.len());
+    for (tree, places) in trees.iter().zip(places.chunks_exact_mut(records.len().max(1))) {
+        keyed.clear();
+        keyed.extend(deposits.iter().map(|deposit| match deposit {
+            Some((place, deposit)) => (tree.grid.leaf(place), *deposit),
+            None => (None, Deposit::default()),
+        }));
+        tree.cells.add(&keyed, places);
     }
     places
 }
@@ -243,13 +243,15 @@ struct FirstVertices<'a> {
     quantum: &'a Quantum,
     diffuse: Vec<(&'a Tree, Table)>,
     glossy: Vec<(&'a Tree, Table)>,
+    /// Places of a small table's cells in the large one.
+    indices: Vec<CellIndex>,
     unfiltered: u64,
 }
 
 impl<'a> FirstVertices<'a> {
     fn new(params: &'a Params, quantum: &'a Quantum, diffuse: &'a [Tree], glossy: &'a [Tree]) -> Self {
         let local = |trees: &'a [Tree]| trees.iter().map(|tree| (tree, Table::default())).collect();
-        Self { params, quantum, diffuse: local(diffuse), glossy: local(glossy), unfiltered: 0 }
+        Self { params, quantum, diffuse: local(diffuse), glossy: local(glossy), indices: Vec::new(), unfiltered: 0 }
     }
 
     fn add(&mut self, record: &PathRecord, suffix: Vec3, pairs: &mut Pairs) {
@@ -267,7 +269,7 @@ impl<'a> FirstVertices<'a> {
             }
             let bin = if kind == PairLobe::Glossy { record.first.bin() } else { 0 };
             let cell = self.quantum.deposit(incident, 1.0).filter(|_| record.first.exists()).and_then(|deposit| {
-                deposit_in_all(trees, &record.first, self.params.leaf, bin, record.sample(), &deposit)
+                deposit_in_all(trees, &place(&record.first, self.params.leaf, bin), record.sample(), &deposit)
             });
             let throughput = lobe.throughput.get();
             match cell {
@@ -281,40 +283,33 @@ impl<'a> FirstVertices<'a> {
         self.unfiltered += u64::from(!kept);
     }
 
-    /// Moves everything to the large tables.
-    fn finish(self, pairs: &mut Pairs) -> (u64, u64) {
-        let mut indices = Vec::new();
-        for (kind, trees) in [(PairLobe::Diffuse, &self.diffuse), (PairLobe::Glossy, &self.glossy)] {
-            for (at, (tree, local)) in trees.iter().enumerate() {
-                tree.cells.merge(local, &mut indices);
-                pairs.renumber(kind, at as u32, &indices);
+    /// Moves everything to the large tables; how many paths stay unfiltered.
+    fn finish(&mut self, pairs: &mut Pairs) -> u64 {
+        for (kind, trees) in [(PairLobe::Diffuse, &mut self.diffuse), (PairLobe::Glossy, &mut self.glossy)] {
+            for (at, (tree, local)) in (0..).zip(trees) {
+                tree.cells.merge(local, &mut self.indices);
+                pairs.renumber(kind, at, &self.indices);
+                local.clear();
             }
         }
         pairs.end_block();
-        (0, self.unfiltered)
+        std::mem::take(&mut self.unfiltered)
     }
 }
 
 /// Adds to a cell of every tree; the tree that the path reads, and the number of its cell there.
 #[inline]
-fn deposit_in_all(
-    trees: &mut [(&Tree, Table)],
-    vertex: &Vertex,
-    side: f32,
-    bin: u8,
-    sample: u8,
-    deposit: &Deposit,
-) -> Option<(u32, u32)> {
+fn deposit_in_all(trees: &mut [(&Tree, Table)], place: &Place, sample: u8, deposit: &Deposit) -> Option<(u32, u32)> {
     let read = u32::from(sample) % trees.len() as u32;
-    let mut place = None;
-    // Either all trees have a place for the vertex or none: they differ by less than a factor of two in extent.
-    for (at, (tree, local)) in trees.iter_mut().enumerate() {
-        let key = tree.leaf(vertex, side, bin)?;
-        let cell = local.cell(key);
+    let mut found = None;
+    // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of
+    // those, and the path reads its own light.
+    for (at, (tree, local)) in (0..).zip(trees.iter_mut()) {
+        let cell = local.cell(tree.grid.leaf(place)?);
         local.add(cell, deposit);
-        if at as u32 == read {
-            place = Some((read, cell));
+        if at == read {
+            found = Some((read, cell));
         }
     }
-    place
+    found
 }

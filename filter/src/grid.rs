@@ -112,13 +112,30 @@ impl Grid {
         Self { corner: anchor.origin - shift, inverse_scale: scale.recip(), finest }
     }
 
-    /// The finest cell for a vertex at `p` that faces `n`, at least `side` / 2 and less than `side` wide before the tree's
-    /// scale, unless that is less than 2⁻¹⁸ of the extent. `attributes`: 45 bits that vertices must agree in to meet. `None` for a place outside the extent.
+    /// The finest cell of a place; `None` for one outside the extent.
     #[inline]
-    pub fn leaf(&self, p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Option<CellKey> {
-        let level = (exponent_of(f64::from(side)) - 1).max(self.finest);
-        let position = (Vec3::from_array(p).as_dvec3() - self.corner) * self.inverse_scale * power_of_two(-level);
-        CellKey::new(level, attributes << 3 | u64::from(facing(n)), position)
+    pub fn leaf(&self, place: &Place) -> Option<CellKey> {
+        let level = place.level.max(self.finest);
+        let position = (place.p - self.corner) * (self.inverse_scale * power_of_two(-level));
+        CellKey::new(level, place.attributes, position)
+    }
+}
+
+/// A vertex as grids see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    p: DVec3,
+    level: i32,
+    attributes: u64,
+}
+
+impl Place {
+    /// A vertex at `p` that faces `n`, whose finest cells are at least `side` / 2 and less than `side` wide before the
+    /// tree's scale, unless that is less than 2⁻¹⁸ of the extent. `attributes`: 45 bits that vertices must agree in to meet.
+    #[inline]
+    pub fn new(p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Self {
+        let level = exponent_of(f64::from(side)) - 1;
+        Self { p: Vec3::from_array(p).as_dvec3(), level, attributes: attributes << 3 | u64::from(facing(n)) }
     }
 }
 
@@ -160,8 +177,8 @@ mod tests {
         #[test]
         fn cells_nest(x in -20.0f32..20.0, y in -20.0f32..20.0, z in -20.0f32..20.0, tree in 0u32..4, up in 1i32..8) {
             let grid = Grid::new(&ANCHOR, tree, 4);
-            let fine = grid.leaf([x, y, z], Vec3::Z, 0.01, 5).unwrap();
-            let coarse = grid.leaf([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5).unwrap();
+            let fine = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01, 5)).unwrap();
+            let coarse = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5)).unwrap();
             let ancestor = (0..up).fold(fine, |key, _| key.parent());
             prop_assert_eq!(ancestor, coarse);
             prop_assert_eq!(ancestor.level(), fine.level() + up);
@@ -175,8 +192,8 @@ mod tests {
             let scaled = Anchor { origin: ANCHOR.origin * scale, extent: ANCHOR.extent * scale };
             let (a, b) = (Grid::new(&ANCHOR, tree, 4), Grid::new(&scaled, tree, 4));
             let s = scale as f32;
-            let at = a.leaf([x, y, 1.0], Vec3::X, side, 1).unwrap();
-            let there = b.leaf([x * s, y * s, s], Vec3::X, side * s, 1).unwrap();
+            let at = a.leaf(&Place::new([x, y, 1.0], Vec3::X, side, 1)).unwrap();
+            let there = b.leaf(&Place::new([x * s, y * s, s], Vec3::X, side * s, 1)).unwrap();
             prop_assert_eq!(there.level(), at.level() + e);
             prop_assert_eq!(there.bits() << 16, at.bits() << 16);
         }
@@ -193,10 +210,10 @@ mod tests {
     fn normals_and_attributes_separate() {
         let grid = Grid::new(&ANCHOR, 0, 4);
         let keys = [
-            grid.leaf([1.0; 3], Vec3::Z, 0.1, 1),
-            grid.leaf([1.0; 3], -Vec3::Z, 0.1, 1),
-            grid.leaf([1.0; 3], Vec3::X, 0.1, 1),
-            grid.leaf([1.0; 3], Vec3::Z, 0.1, 2),
+            grid.leaf(&Place::new([1.0; 3], Vec3::Z, 0.1, 1)),
+            grid.leaf(&Place::new([1.0; 3], -Vec3::Z, 0.1, 1)),
+            grid.leaf(&Place::new([1.0; 3], Vec3::X, 0.1, 1)),
+            grid.leaf(&Place::new([1.0; 3], Vec3::Z, 0.1, 2)),
         ];
         for (i, a) in keys.iter().enumerate() {
             assert!(a.is_some());
@@ -207,9 +224,9 @@ mod tests {
     #[test]
     fn far_places_have_no_cell_and_all_of_the_scene_has_one() {
         let grid = Grid::new(&ANCHOR, 0, 4);
-        assert_eq!(grid.leaf([1e9, 0.0, 0.0], Vec3::Z, 1e-6, 0), None);
+        assert_eq!(grid.leaf(&Place::new([1e9, 0.0, 0.0], Vec3::Z, 1e-6, 0)), None);
         for side in [1e-30, 1e-6, 1.0] {
-            assert!(grid.leaf([23.0, -22.0, 27.0], Vec3::Z, side, 0).is_some());
+            assert!(grid.leaf(&Place::new([23.0, -22.0, 27.0], Vec3::Z, side, 0)).is_some());
         }
     }
 }

@@ -74,7 +74,10 @@ pub(crate) struct Pairs {
     compact: usize,
     /// Where the current block began: there, cells have the numbers of the part's own tables.
     block: usize,
-    own: std::collections::BTreeMap<u32, Own>,
+    /// By slot.
+    own: Vec<(u32, Own)>,
+    /// Where in it the last path's slot is.
+    last: usize,
 }
 
 impl Pairs {
@@ -100,12 +103,24 @@ impl Pairs {
 
     /// Adds what a path brings through glossy lobes.
     pub fn add_own(&mut self, slot: u32, odd: bool, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own.entry(slot).or_default().glossy[usize::from(odd)], radiance, quantum);
+        add_quanta(&mut self.own(slot).glossy[usize::from(odd)], radiance, quantum);
     }
 
     /// Adds what a path brings that no cell could take.
     pub fn add_unfiltered(&mut self, slot: u32, lobe: Lobe, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own.entry(slot).or_default().unfiltered[lobe as usize], radiance, quantum);
+        add_quanta(&mut self.own(slot).unfiltered[lobe as usize], radiance, quantum);
+    }
+
+    /// Sums of a slot.
+    fn own(&mut self, slot: u32) -> &mut Own {
+        // Paths of a slot come one after the other.
+        if self.own.get(self.last).is_none_or(|(at, _)| *at != slot) {
+            self.last = self.own.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
+                self.own.insert(at, (slot, Own::default()));
+                at
+            });
+        }
+        &mut self.own[self.last].1
     }
 
     /// Gives the pairs of the current block that read `tree` the numbers of the large tables.
@@ -139,7 +154,7 @@ impl Pairs {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.pairs.capacity() * size_of::<Pair>() + self.own.len() * size_of::<(u32, Own)>()
+        self.pairs.capacity() * size_of::<Pair>() + self.own.capacity() * size_of::<(u32, Own)>()
     }
 
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
@@ -150,15 +165,17 @@ impl Pairs {
     ) -> Vec<(u32, Resolved)> {
         self.compact();
         self.block = self.pairs.len();
-        let mut slots: std::collections::BTreeMap<u32, [[i128; 3]; 2]> =
-            self.own.keys().map(|&slot| (slot, Default::default())).collect();
         // Products are rounded one by one and summed as integers: the order of cells within a slot, which depends on who
         // met them first, does not count.
         let scale = 2f64.powi(RESOLVED_BITS);
+        let mut sums: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
         for pair in &self.pairs {
+            if sums.last().is_none_or(|(slot, _)| *slot != pair.slot()) {
+                sums.push((pair.slot(), Default::default()));
+            }
+            let Some((_, lobes)) = sums.last_mut() else { continue };
             let estimate = read(pair.lobe(), pair.tree() as usize, pair.cell);
-            let sums = &mut slots.entry(pair.slot()).or_default()[pair.lobe() as usize];
-            for ((sum, throughput), x) in sums.iter_mut().zip(pair.throughput).zip(estimate) {
+            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(pair.throughput).zip(estimate) {
                 *sum += (f64::from(throughput) * f64::from(x) / quantum.radiance() * scale) as i128;
             }
         }
@@ -169,18 +186,23 @@ impl Pairs {
         let own_radiance = |sum: [i64; 3]| {
             (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
         };
+        let resolved = |[diffuse, glossy]: [[i128; 3]; 2], own: &Own| Resolved {
+            diffuse: radiance(diffuse) + own_radiance(own.unfiltered[0]),
+            glossy: radiance(glossy) + own_radiance(own.unfiltered[1]),
+            glossy_own: own.glossy.map(own_radiance),
+        };
+        // Both lists are by slot, and a slot may be in one alone.
+        let mut own = self.own.iter().peekable();
+        let mut slots = Vec::with_capacity(sums.len());
+        for (slot, lobes) in sums {
+            while let Some((slot, own)) = own.next_if(|(at, _)| *at < slot) {
+                slots.push((*slot, resolved(Default::default(), own)));
+            }
+            let own = own.next_if(|(at, _)| *at == slot).map_or(Own::default(), |(_, own)| *own);
+            slots.push((slot, resolved(lobes, &own)));
+        }
+        slots.extend(own.map(|(slot, own)| (*slot, resolved(Default::default(), own))));
         slots
-            .into_iter()
-            .map(|(slot, [diffuse, glossy])| {
-                let own = self.own.get(&slot).copied().unwrap_or_default();
-                let resolved = Resolved {
-                    diffuse: radiance(diffuse) + own_radiance(own.unfiltered[0]),
-                    glossy: radiance(glossy) + own_radiance(own.unfiltered[1]),
-                    glossy_own: own.glossy.map(own_radiance),
-                };
-                (slot, resolved)
-            })
-            .collect()
     }
 }
 

@@ -131,6 +131,17 @@ const SHARD_BITS: u32 = 6;
 /// Number of shards: enough that a few dozen threads seldom meet, few enough that a batch per shard is worth a lock.
 const SHARDS: usize = 1 << SHARD_BITS;
 
+/// Indices of items by their shard, each shard's in order; items without a shard are left out.
+fn by_shard(shards: impl Iterator<Item = Option<usize>>) -> Vec<Vec<u32>> {
+    let mut batches = vec![Vec::new(); SHARDS];
+    for (at, shard) in (0..).zip(shards) {
+        if let Some(shard) = shard {
+            batches[shard].push(at);
+        }
+    }
+    batches
+}
+
 #[inline]
 fn shard_of(key: CellKey) -> usize {
     (key.hash() >> (64 - SHARD_BITS)) as usize
@@ -149,19 +160,19 @@ impl Default for ShardedTable {
 }
 
 impl ShardedTable {
-    /// Adds deposits to the cells of their keys. The cell of entry (key, deposit, i) is then at `places[i]`.
+    /// Adds deposits to the cells of their keys, where there is a key; places of the cells in the same order.
     ///
     /// # Panics
     /// As [`Self::merge`].
-    pub fn add(&self, batch: &mut [(CellKey, Deposit, u32)], places: &mut [CellIndex]) {
-        batch.sort_unstable_by_key(|(key, _, at)| (shard_of(*key), *at));
-        for batch in batch.chunk_by(|(a, ..), (b, ..)| shard_of(*a) == shard_of(*b)) {
-            let shard = shard_of(batch[0].0);
+    pub fn add(&self, deposits: &[(Option<CellKey>, Deposit)], places: &mut [Option<CellIndex>]) {
+        let shards = deposits.iter().map(|(key, _)| key.map(shard_of));
+        for (shard, batch) in by_shard(shards).iter().enumerate().filter(|(_, batch)| !batch.is_empty()) {
             let mut table = self.lock(shard);
-            for (key, deposit, at) in batch {
+            for &at in batch {
+                let (Some(key), deposit) = &deposits[at as usize] else { continue };
                 let number = table.cell(*key);
                 table.add(number, deposit);
-                places[*at as usize] = place(shard, number);
+                places[at as usize] = Some(place(shard, number));
             }
         }
     }
@@ -175,14 +186,10 @@ impl ShardedTable {
     /// # Panics
     /// If a shard comes to hold 2²⁶ cells, 4 GiB.
     pub fn merge(&self, local: &Table, indices: &mut Vec<CellIndex>) {
-        let mut by_shard: Vec<u32> = (0..local.cells.len() as u32).collect();
-        by_shard.sort_unstable_by_key(|&cell| shard_of(local.cells[cell as usize].key));
         indices.clear();
         indices.resize(local.cells.len(), 0);
-        for batch in
-            by_shard.chunk_by(|&a, &b| shard_of(local.cells[a as usize].key) == shard_of(local.cells[b as usize].key))
-        {
-            let shard = shard_of(local.cells[batch[0] as usize].key);
+        let shards = local.cells.iter().map(|cell| Some(shard_of(cell.key)));
+        for (shard, batch) in by_shard(shards).iter().enumerate().filter(|(_, batch)| !batch.is_empty()) {
             let mut table = self.lock(shard);
             for &cell in batch {
                 let Cell { key, sums } = &local.cells[cell as usize];
