@@ -7,7 +7,7 @@ use crate::interaction::SurfaceInteraction;
 use crate::light::{Receiver, Target, power_heuristic};
 use crate::material::Shading;
 use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
-use crate::sampling::{Dimension, Numbers, Use};
+use crate::sampling::{Use, VertexNumbers};
 use crate::world::{Techniques, World};
 
 /// The last scattering event of a path, if a light sample could have chosen the direction it took.
@@ -82,12 +82,10 @@ pub fn sample<Q: Queries>(
     world: &World,
     queries: &Q,
     vertex: &Vertex<'_>,
-    numbers: &Numbers,
-    bounce: u32,
+    numbers: &VertexNumbers,
     counters: &mut Counters,
 ) -> Option<DirectLight> {
-    let u_select = numbers.d1(Dimension::at(bounce, Use::LightSelect));
-    let u = numbers.d2(Dimension::at(bounce, Use::Light));
+    let (u_select, u) = (numbers.d1(Use::LightSelect), numbers.d2(Use::Light));
     let light = world.lights.sample(&vertex.receiver(), u_select, u)?;
     let wi = vertex.shading.frame.to_local(light.wi);
     let (f, bsdf_pdf) = vertex.shading.bsdf.eval_pdf(vertex.wo, wi);

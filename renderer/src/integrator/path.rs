@@ -59,13 +59,14 @@ pub fn trace<Q: Queries, R: Recorder>(
 
         // Light that a light sample brings, and the direction in which the path goes on.
         path.arrive(&vertex);
+        let at_vertex = numbers.vertex(path.bounce);
         if !vertex.shading.bsdf.is_specular() {
-            let light = direct::sample(world, queries, &vertex, numbers, path.bounce, counters);
+            let light = direct::sample(world, queries, &vertex, &at_vertex, counters);
             light.iter().for_each(|light| path.receive(&vertex, light));
         }
-        let u_lobe = numbers.d1(Dimension::at(path.bounce, Use::Lobe));
-        let u = numbers.d2(Dimension::at(path.bounce, Use::Bsdf));
-        let Some(next) = vertex.shading.bsdf.sample(vertex.wo, u_lobe, u) else { break };
+        let Some(next) = vertex.shading.bsdf.sample(vertex.wo, at_vertex.d1(Use::Lobe), at_vertex.d2(Use::Bsdf)) else {
+            break;
+        };
         path.scatter(&vertex, &next);
         counters.scatterings += 1;
 

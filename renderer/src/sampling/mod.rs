@@ -10,4 +10,4 @@ pub(crate) mod stats;
 pub use discrete::AliasTable;
 pub use hash::mix64;
 pub use piecewise::{PiecewiseConstant1D, PiecewiseConstant2D};
-pub use sampler::{Dimension, Numbers, Sampler, Use};
+pub use sampler::{Dimension, Numbers, Sampler, Use, VertexNumbers};

@@ -1,5 +1,7 @@
 //! Owen-scrambled Sobol' numbers as a pure function of seed, pixel, sample and dimension.
 
+use std::array::from_fn;
+
 use glam::Vec2;
 
 use super::hash::{mix64, nested_hash};
@@ -63,13 +65,25 @@ impl Numbers {
     #[inline]
     pub fn d2(&self, dimension: Dimension) -> Vec2 {
         let seeds = self.seeds(dimension);
-        // A third seed from both: the upper half of the product depends on all of its bits.
-        let seed_y = (seeds.wrapping_mul(GOLDEN) >> 32) as u32;
         let index = nested_hash(self.reversed_index, seeds as u32).reverse_bits();
         let x = nested_hash(index, (seeds >> 32) as u32);
-        let y = nested_hash(second_sobol_reversed(index), seed_y);
+        let y = nested_hash(second_sobol_reversed(index), third_seed(seeds));
         let both = (u64::from(x) << 32 | u64::from(y)).reverse_bits();
         Vec2::new(unit(both as u32), unit((both >> 32) as u32))
+    }
+
+    /// The numbers that every vertex needs, all at once: what [`Self::d1`] and [`Self::d2`] say of its dimensions.
+    // Not inlined: the compiler takes each step for all lanes as vectors, but only as long as it sees no lane that nobody
+    // looks at.
+    #[inline(never)]
+    pub fn vertex(&self, bounce: u32) -> VertexNumbers {
+        let first = Dimension::at(bounce, Use::LightSelect).0;
+        let seeds: [u64; LANES] = from_fn(|lane| self.seeds(Dimension(first.wrapping_add(lane as u32))));
+        let index = seeds.map(|seeds| nested_hash(self.reversed_index, seeds as u32).reverse_bits());
+        let x: [u32; LANES] = from_fn(|lane| nested_hash(index[lane], (seeds[lane] >> 32) as u32));
+        let y: [u32; LANES] = from_fn(|lane| nested_hash(second_sobol_reversed(index[lane]), third_seed(seeds[lane])));
+        let number = |digits: u32| unit(digits.reverse_bits());
+        VertexNumbers { x: x.map(number), y: y.map(number) }
     }
 
     #[inline]
@@ -81,6 +95,36 @@ impl Numbers {
 
 /// 2⁶⁴ / golden ratio, made odd.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A third seed from the two of a dimension: the upper half of the product depends on all of their bits.
+#[inline]
+const fn third_seed(seeds: u64) -> u32 {
+    (seeds.wrapping_mul(GOLDEN) >> 32) as u32
+}
+
+/// Uses that every vertex has: all before [`Use::Roulette`].
+const LANES: usize = Use::Roulette as usize;
+
+/// The numbers that every vertex of a path needs: see [`Use`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexNumbers {
+    x: [f32; LANES],
+    y: [f32; LANES],
+}
+
+impl VertexNumbers {
+    /// [`Numbers::d1`] of a use, which is not the roulette.
+    #[inline]
+    pub fn d1(&self, what: Use) -> f32 {
+        self.x[what as usize]
+    }
+
+    /// [`Numbers::d2`] of a use, which is not the roulette.
+    #[inline]
+    pub fn d2(&self, what: Use) -> Vec2 {
+        Vec2::new(self.x[what as usize], self.y[what as usize])
+    }
+}
 
 /// The second Sobol' dimension with reversed bits (bit j is the digit of 2^-(j+1)).
 ///
@@ -107,7 +151,7 @@ fn unit(bits: u32) -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Dimension(u32);
 
-/// Uses of numbers at each vertex of a path.
+/// Uses of numbers at each vertex of a path. The first four are drawn together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Use {
     /// Which light (one number).

@@ -178,3 +178,17 @@ fn samples_beyond_2_to_the_32_are_new() {
     }));
     assert!(p > REJECT, "p = {p}");
 }
+
+#[test]
+fn the_numbers_of_a_vertex_are_those_of_its_dimensions() {
+    for i in 0..1000 {
+        let numbers = Sampler::new(i).pixel_sample([i as u32, 7], i << 23);
+        for bounce in [0, 1, 5, u32::MAX] {
+            let drawn = numbers.vertex(bounce);
+            for what in [Use::LightSelect, Use::Light, Use::Lobe, Use::Bsdf] {
+                let dimension = Dimension::at(bounce, what);
+                assert_eq!((drawn.d1(what), drawn.d2(what)), (numbers.d1(dimension), numbers.d2(dimension)));
+            }
+        }
+    }
+}
