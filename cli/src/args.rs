@@ -66,6 +66,10 @@ Examples:
   As good as ten minutes allow:
     tessera render shot.pbrt -o shot.exr --spp 100000 --time-limit 10m
 
+  Without the filter, and with the one of the 2018 talk and cells twice as wide as usual:
+    tessera render shot.pbrt -o plain.exr --filter none
+    tessera render shot.pbrt -o talk.exr --filter talk --filter-set side=16
+
 The same scene, seed and samples give the same file, byte for byte, on any number of threads; only a time limit makes \
 the number of samples depend on the machine. The file appears under its name only when it is complete. Its date is that \
 of the environment variable SOURCE_DATE_EPOCH, else 1970; --provenance writes the real one.
@@ -91,6 +95,9 @@ pub struct RenderArguments {
     /// How good the picture gets.
     #[command(flatten)]
     pub quality: QualityArguments,
+    /// How samples share what they find.
+    #[command(flatten)]
+    pub filter: FilterArguments,
     /// Which pixels are rendered.
     #[command(flatten)]
     pub frame_area: FrameArguments,
@@ -121,6 +128,45 @@ pub struct QualityArguments {
     /// Exit with 5 if a sample had to be rejected because it was not a number
     #[arg(long)]
     pub strict: bool,
+}
+
+/// How samples share what they find.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Filter")]
+pub struct FilterArguments {
+    /// Path space filter: paths that meet near each other share what they find. With --sample-range they share within the
+    /// range only
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub filter: FilterKind,
+    /// Settings of the filter; one that it does not have is answered by a list of all
+    #[arg(long, value_name = "KEY=VALUE,...", value_delimiter = ',', value_parser = setting)]
+    pub filter_set: Vec<(String, String)>,
+    /// Weight of earlier frames in the talk's moving average over a sequence, in [0, 1)
+    #[arg(long, value_name = "ALPHA", value_parser = alpha)]
+    pub temporal: Option<f32>,
+}
+
+/// Which path space filter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum FilterKind {
+    /// Every pixel by itself
+    None,
+    /// Cells of one size, as in the talk of 2018: a fixed blur, whose bias stays however many samples there are
+    Talk,
+    /// Cells as fine as the samples can tell apart, down to no filter at all
+    #[default]
+    Adaptive,
+}
+
+impl FilterKind {
+    /// As the renderer names it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Talk => "talk",
+            Self::Adaptive => "adaptive",
+        }
+    }
 }
 
 /// Which pixels are rendered.
@@ -355,6 +401,16 @@ fn pixel_bounds(text: &str) -> Result<[i32; 4], String> {
         return Err("expected X0 < X1 and Y0 < Y1".into());
     }
     Ok(bounds)
+}
+
+fn setting(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("expected KEY=VALUE, such as trees=8")?;
+    Ok((key.trim().to_owned(), value.trim().to_owned()))
+}
+
+fn alpha(text: &str) -> Result<f32, String> {
+    let alpha = text.parse().ok().filter(|alpha| (0.0..1.0).contains(alpha));
+    alpha.ok_or_else(|| "expected a number of at least 0 and less than 1".to_owned())
 }
 
 fn threshold(text: &str) -> Result<f64, String> {

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::args::RenderArguments;
+use renderer::filtering::Filtering;
+
+use crate::args::{FilterArguments, RenderArguments};
 use crate::exit::Failure;
 use crate::frame_name;
 
@@ -52,6 +54,27 @@ pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// How the frame is to be filtered.
+///
+/// # Errors
+/// Settings that the filter does not have or does not take, and what cannot be done yet.
+pub fn filtering(arguments: &FilterArguments) -> Result<Filtering, Failure> {
+    if arguments.temporal.is_some() {
+        return Err(Failure::Usage(
+            "--temporal averages over the frames of a sequence, and a sequence cannot be rendered in one run yet: leave it \
+             out, and every frame is filtered by itself"
+                .into(),
+        ));
+    }
+    let mut filtering = Filtering::named(arguments.filter.name()).expect("every kind of the command line has a filter");
+    let usage = |error: renderer::filtering::SettingError| Failure::Usage(format!("--filter-set: {error}"));
+    for (key, value) in &arguments.filter_set {
+        filtering.set(key, value).map_err(usage)?;
+    }
+    filtering.validate().map_err(usage)?;
+    Ok(filtering)
 }
 
 /// How many threads to run: what was typed; else what Slurm gave the task; else what the affinity mask and the control

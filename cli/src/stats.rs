@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use renderer::filtering::Report;
+use renderer::render::Statistics;
 use serde::Serialize;
 
 /// The file of `--stats`. Keys are part of the program's interface: they may be added to, not renamed.
@@ -35,6 +37,8 @@ pub struct Stats<'a> {
     pub primitives: Primitives,
     /// Memory.
     pub memory: Memory,
+    /// The path space filter; `null` without one.
+    pub filter: Option<Filter>,
     /// What was not as it should be.
     pub problems: Problems,
 }
@@ -85,6 +89,114 @@ pub struct Memory {
     pub embree_bytes: u64,
     /// The film.
     pub film_bytes: u64,
+}
+
+/// What the path space filter did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Filter {
+    /// Which filter.
+    pub name: &'static str,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Those over the seconds of rendering.
+    pub share: f64,
+    /// Paths with a vertex to share.
+    pub paths: u64,
+    /// Cells at the end.
+    pub cells: u64,
+    /// Bytes held from pass to pass.
+    pub bytes: u64,
+    /// Paths that kept their own light since no cell could take it. Of the talk's: lobes of paths.
+    pub unfiltered: u64,
+    /// What only one filter has.
+    #[serde(flatten)]
+    pub particular: Particular,
+}
+
+/// What only one filter has to say.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum Particular {
+    /// The adaptive filter.
+    Adaptive {
+        /// Cells of second vertices, in the last pass.
+        second_cells: u64,
+        /// Pairs of a pixel and a cell that it reads.
+        pairs: u64,
+    },
+    /// The talk's.
+    Talk {
+        /// Slots of the table.
+        slots: u64,
+        /// Share of them with a cell.
+        occupancy: f64,
+        /// Cells by slots looked at to find them: entry i for i + 1.
+        probes: Vec<u64>,
+        /// Lobes of paths, each of which asks for a cell.
+        lobes: u64,
+        /// Share of lobes for which there was no slot.
+        unresolved_share: f64,
+        /// Cells that gave way to others.
+        evicted: u64,
+    },
+}
+
+impl Filter {
+    /// Of a render; `None` if it was not filtered.
+    pub fn of(statistics: &Statistics) -> Option<Self> {
+        let seconds = statistics.filter_seconds;
+        let share = if statistics.render_seconds > 0.0 { seconds / statistics.render_seconds } else { 0.0 };
+        Some(match statistics.filter.as_ref()? {
+            Report::Adaptive(report) => Self {
+                name: "adaptive",
+                seconds,
+                share,
+                paths: report.paths,
+                cells: report.cells,
+                bytes: report.bytes,
+                unfiltered: report.unfiltered,
+                particular: Particular::Adaptive { second_cells: report.second_cells, pairs: report.pairs },
+            },
+            Report::Talk(report) => Self {
+                name: "talk",
+                seconds,
+                share,
+                paths: report.paths,
+                cells: report.cells,
+                bytes: report.bytes,
+                unfiltered: report.unresolved + report.rejected + report.placeless,
+                particular: Particular::Talk {
+                    slots: report.slots,
+                    occupancy: report.occupancy(),
+                    probes: report.probes.clone(),
+                    lobes: report.lobes,
+                    unresolved_share: report.unresolved_share(),
+                    evicted: report.evicted,
+                },
+            },
+        })
+    }
+
+    /// One line for people.
+    pub fn summary(&self) -> String {
+        let detail = match &self.particular {
+            Particular::Adaptive { pairs, .. } => format!("{pairs} pairs of pixel and cell"),
+            Particular::Talk { occupancy, unresolved_share, .. } => {
+                let [occupancy, unresolved] = [occupancy, unresolved_share].map(|share| 100.0 * share);
+                format!("table {occupancy:.1} % full, {unresolved:.2} % unresolved")
+            }
+        };
+        format!(
+            "filter {}: {:.2} s, {:.1} % of rendering; {} paths shared {} cells; {detail}; {:.1} MB; {} unfiltered",
+            self.name,
+            self.seconds,
+            100.0 * self.share,
+            self.paths,
+            self.cells,
+            self.bytes as f64 / 1e6,
+            self.unfiltered,
+        )
+    }
 }
 
 /// Counts of what was not as it should be.

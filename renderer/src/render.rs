@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::compile::{self, CompileError};
 use crate::film::{AovSet, Film, Tile, TilePixel};
-use crate::filtering::{Filtering, FrameFilter, Keep, Keeper, Nothing, Paths};
+use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
@@ -100,6 +100,9 @@ pub enum RenderError {
     /// Nothing to do.
     #[error("the sample range {}:{} is empty; the first number must be less than the second", .0.start, .0.end)]
     EmptySampleRange(Range<u64>),
+    /// The filter does not take its settings.
+    #[error(transparent)]
+    Filter(#[from] SettingError),
 }
 
 fn count_errors(diagnostics: &[Diagnostic]) -> String {
@@ -136,6 +139,8 @@ pub struct FrameDescription {
     pub ndc_from_world: Option<glam::DMat4>,
     /// The output that the scene names.
     pub filename: Option<PathBuf>,
+    /// How the frame is filtered.
+    pub filtering: Filtering,
 }
 
 impl FrameDescription {
@@ -171,7 +176,7 @@ pub struct Statistics {
     /// Seconds of filtering, of those of rendering.
     pub filter_seconds: f64,
     /// What the filter did.
-    pub filter: Option<filter::Report>,
+    pub filter: Option<filtering::Report>,
 }
 
 /// A scene that is read and built, with what of the job it decides.
@@ -182,8 +187,6 @@ pub struct Prepared {
     pub description: FrameDescription,
     /// Auxiliary outputs of the job and of the file.
     pub aovs: AovSet,
-    /// How the frame is filtered.
-    pub filtering: Filtering,
     /// Seconds so far.
     pub statistics: Statistics,
     /// Owns the BVH's memory.
@@ -229,6 +232,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     if asked.is_empty() {
         return Err(RenderError::EmptySampleRange(asked));
     }
+    job.filtering.validate()?;
     let mut aovs = job.aovs;
     if description.film.gbuffer {
         aovs = AovSet::all();
@@ -254,8 +258,9 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         camera_from_world: description.camera.world_from_camera.inverse().matrix(),
         ndc_from_world: world.camera.ndc_from_world(),
         filename: description.film.filename.clone(),
+        filtering: job.filtering,
     };
-    Ok(Prepared { world, description, aovs, filtering: job.filtering, statistics, device })
+    Ok(Prepared { world, description, aovs, statistics, device })
 }
 
 /// Traces all passes of a prepared job.
@@ -281,45 +286,43 @@ fn trace_queries<Q: Queries + Sync>(
     observer: &dyn Observer,
     over: &dyn Fn() -> bool,
 ) -> Frame {
-    let Prepared { world, description, aovs, filtering, statistics, .. } = prepared;
+    let Prepared { world, description, aovs, statistics, .. } = prepared;
     let (mut description, mut statistics) = (description.clone(), statistics.clone());
     let film = Film::new(world.sensor.resolution, world.sensor.bounds, *aovs);
     statistics.film_bytes = Film::memory(film.bounds(), *aovs);
     let asked = description.sample_range_asked.clone();
     let progress = Progress::new(&film, &asked, observer);
     let mut passes = Passes { world, queries, sampler: Sampler::new(description.seed), film, progress };
+    let filter = passes.filter(&description.filtering);
     let mut done = |pass: &Range<u64>, counters: Counters| {
         statistics.counters += counters;
         statistics.passes += 1;
         description.sample_range.end = pass.end;
         over()
     };
-    match filtering {
-        Filtering::None => {
+    match filter {
+        None => {
             for pass in self::passes(&asked) {
-                let (counters, _) = passes.trace::<Nothing>(&pass);
+                let (counters, _) = passes.trace(&pass, || Nothing);
                 if done(&pass, counters) {
                     break;
                 }
             }
         }
-        Filtering::Adaptive(params, blend) => {
-            let unit = passes.unit();
-            passes.film = passes.film.with_split();
-            let mut filter = FrameFilter::new(params, blend, world, &mut passes.film, unit);
-            let mut seconds = 0.0;
+        Some(mut filter) => {
+            let (selection, mut filtering) = (filter.selection(), Duration::ZERO);
             for pass in filter.blocks(&asked) {
-                let (counters, paths) = passes.trace::<Paths>(&pass);
+                let (counters, paths) = passes.trace(&pass, || Paths::new(selection));
                 let start = Instant::now();
-                filter.add(&paths.into_iter().map(|paths| paths.0).collect::<Vec<_>>());
-                seconds += start.elapsed().as_secs_f64();
+                filter.add(&paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
+                filtering += start.elapsed();
                 if done(&pass, counters) {
                     break;
                 }
             }
             let start = Instant::now();
             statistics.filter = Some(filter.finish(world, &mut passes.film));
-            statistics.filter_seconds = seconds + start.elapsed().as_secs_f64();
+            statistics.filter_seconds = (filtering + start.elapsed()).as_secs_f64();
         }
     }
     Frame { film: passes.film, description, statistics }
@@ -350,14 +353,24 @@ struct Passes<'a, Q> {
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
+    /// The filter, and what the film must keep for it.
+    fn filter(&mut self, filtering: &Filtering) -> Option<FrameFilter> {
+        if *filtering == Filtering::None {
+            return None;
+        }
+        let unit = self.unit();
+        self.film.keep_split();
+        FrameFilter::new(filtering, self.world, &mut self.film, unit).expect("`prepare` has checked the settings")
+    }
+
     /// Traces samples `pass` of every pixel; what was kept of them, by tile.
-    fn trace<K: Keeper>(&mut self, pass: &Range<u64>) -> (Counters, Vec<K>) {
+    fn trace<K: Keeper>(&mut self, pass: &Range<u64>, keeper: impl Fn() -> K + Sync) -> (Counters, Vec<K>) {
         let first_hit = self.film.aovs().first_hit();
         let mut tiles = self.film.tiles();
         let traced: Vec<(Counters, K)> = tiles
             .par_iter_mut()
             .map(|tile| {
-                let mut keeper = K::default();
+                let mut keeper = keeper();
                 let counters = trace_tile(self.world, self.queries, tile, pass, &self.sampler, first_hit, &mut keeper);
                 self.progress.add(counters.camera_rays);
                 (counters, keeper)
@@ -416,7 +429,7 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
             let numbers = sampler.pixel_sample([x, y], index);
             let offset = world.filter.sample(numbers.d2(Dimension::FILM));
             let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
-            let mut recorder = K::Recorder::default();
+            let mut recorder = keeper.recorder();
             let camera = world.camera.ray(film_point, numbers.d2(Dimension::LENS));
             let mut sample = camera.map_or_else(Sample::default, |camera| {
                 integrator::trace(world, queries, &camera, &numbers, first_hit, &mut recorder, &mut counters)
@@ -429,7 +442,7 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
             if !exposed.is_finite() || sample.radiance.min_element() < 0.0 {
                 counters.rejected_samples += 1;
                 (exposed, exposure) = (glam::Vec3::ZERO, 0.0);
-                recorder = K::Recorder::default();
+                recorder = keeper.recorder();
                 sample.radiance = exposed;
             }
             pixel.add(exposed, sample.alpha, offset.weight);

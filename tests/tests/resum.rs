@@ -1,18 +1,20 @@
 //! A path cut for the filter is still the path: its pieces sum to the unfiltered sample.
+#![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
 use std::path::Path;
 
 use renderer::film::{AovSet, Film};
-use renderer::filtering::{Keep, Keeper, Paths};
+use renderer::filtering::{Filtering, Keep, Keeper, Paths, Selection};
 use renderer::integrator::{AlphaTested, Cut, Opaque, Queries};
 use renderer::render::{Job, Prepared, Unobserved, prepare, trace_tile};
 use renderer::sampling::Sampler;
-use tests::render::own_scene;
+use tests::render::{own_scene, run};
 use tests::shared;
 
 /// Compares every path's pieces with its radiance.
 #[derive(Default)]
 struct Resum {
+    selection: Selection,
     paths: u64,
     recorded: u64,
     /// Largest difference relative to the path's largest channel.
@@ -24,15 +26,19 @@ struct Resum {
 impl Keeper for Resum {
     type Recorder = Cut;
 
+    fn recorder(&self) -> Cut {
+        Paths::new(self.selection).recorder()
+    }
+
     fn keep(&mut self, cut: &Cut, sample: Keep<'_>) {
         let weight = sample.weight * sample.exposure;
         let whole = sample.radiance * weight;
         let mut paths = Paths::default();
         paths.keep(cut, Keep { split: None, ..sample });
-        let pieces = paths.0.iter().fold(cut.prefix() * weight, |sum, record| sum + record.unfiltered());
+        let pieces = paths.records.iter().fold(cut.prefix() * weight, |sum, record| sum + record.unfiltered());
         let difference = (pieces - whole).abs().max_element() / whole.abs().max_element().max(f32::MIN_POSITIVE);
         self.paths += 1;
-        self.recorded += paths.0.len() as u64;
+        self.recorded += paths.records.len() as u64;
         // NaN is worse than anything.
         if difference > self.worst || difference.is_nan() {
             self.worst = difference;
@@ -46,10 +52,10 @@ impl Keeper for Resum {
 /// those come some f32 roundings a vertex. Twice the sum of the packing errors leaves room for both.
 const BOUND: f32 = 2.0 * 4.0 / (1 << 17) as f32;
 
-fn trace<Q: Queries>(prepared: &Prepared, queries: &Q) -> Resum {
+fn trace<Q: Queries>(prepared: &Prepared, queries: &Q, selection: Selection) -> Resum {
     let world = &prepared.world;
     let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default());
-    let mut resum = Resum::default();
+    let mut resum = Resum { selection, ..Resum::default() };
     for tile in &mut film.tiles() {
         trace_tile(world, queries, tile, &(0..8), &Sampler::new(1), false, &mut resum);
     }
@@ -60,14 +66,20 @@ fn check(scene: &Path) {
     let job = Job { scene: scene.to_owned(), spp: Some(1), resolution: Some([64, 48]), ..Job::default() };
     let prepared = prepare(&job, &Unobserved).unwrap_or_else(|error| panic!("{}: {error}", scene.display()));
     let geometry = &prepared.world.geometry;
-    let resum = match geometry.alpha_test(&prepared.world.textures) {
-        None => trace(&prepared, &Opaque(geometry.scene())),
-        Some(alpha) => trace(&prepared, &AlphaTested { scene: geometry.scene(), alpha }),
-    };
-    let Resum { paths, recorded, worst, example } = resum;
-    println!("{}: {paths} paths, {recorded} recorded, worst difference {worst:e}", scene.display());
-    assert!(recorded > paths / 4, "{}: only {recorded} of {paths} paths have a selected vertex", scene.display());
-    assert!(worst <= BOUND, "{}: {worst:e}: {example}", scene.display());
+    let mut before = u64::MAX;
+    for (selection, least) in [(Selection::Primary, 0.25), (Selection::Secondary, 0.0), (Selection::Tertiary, 0.0)] {
+        let resum = match geometry.alpha_test(&prepared.world.textures) {
+            None => trace(&prepared, &Opaque(geometry.scene()), selection),
+            Some(alpha) => trace(&prepared, &AlphaTested { scene: geometry.scene(), alpha }, selection),
+        };
+        let Resum { paths, recorded, worst, example, .. } = resum;
+        let name = scene.display();
+        println!("{name}: {selection:?}: {paths} paths, {recorded} recorded, worst difference {worst:e}");
+        assert!(recorded as f64 > least * paths as f64, "{name}: only {recorded} of {paths} paths are cut");
+        assert!(recorded < before, "{name}: {recorded} paths are cut at a later vertex, {before} at an earlier one");
+        assert!(worst <= BOUND, "{name}: {worst:e}: {example}");
+        before = recorded;
+    }
 }
 
 #[test]
@@ -76,6 +88,24 @@ fn pieces_sum_to_the_sample() {
     for name in shared::SCENES {
         if let Some(scene) = shared::scene(name) {
             check(&scene);
+        }
+    }
+}
+
+#[test]
+fn an_image_whose_paths_share_nothing_is_the_unfiltered_one() {
+    for vertex in ["primary", "secondary", "tertiary"] {
+        let mut filtering = Filtering::named("talk").expect("the talk's filter");
+        // Cells of a ten-thousandth of a pixel hold one path each.
+        for (key, value) in [("vertex", vertex), ("side", "1e-4"), ("jitter", "none")] {
+            filtering.set(key, value).expect("a setting of the talk");
+        }
+        let (resolution, spp) = (Some([64, 36]), Some(4));
+        let film = run(&Job { scene: own_scene("show/show.pbrt"), spp, resolution, filtering, ..Job::default() }).film;
+        for at in film.bounds().pixels() {
+            let (own, filtered) = (film.pixel(at).mean(), film.value(at));
+            let difference = (own - filtered).abs().max_element();
+            assert!(difference <= f64::from(BOUND) * own.abs().max_element(), "{vertex} {at:?}: {filtered}, not {own}");
         }
     }
 }

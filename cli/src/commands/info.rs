@@ -131,7 +131,8 @@ fn failure(error: &RenderError, log: &Log) -> Failure {
         RenderError::Embree(_)
         | RenderError::OpenImageIo(_)
         | RenderError::Threads { .. }
-        | RenderError::EmptySampleRange(_) => Failure::Render(error.to_string()),
+        | RenderError::EmptySampleRange(_)
+        | RenderError::Filter(_) => Failure::Render(error.to_string()),
     }
 }
 

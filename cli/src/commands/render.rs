@@ -7,6 +7,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use oiio::Attribute;
 use renderer::film::AovSet;
 use renderer::film::exr::{self, Losses};
+use renderer::filtering::Filtering;
 use renderer::render::{self, Frame, Job, Observer, Phase, RenderError};
 use renderer::scene::{Diagnostic, Severity};
 
@@ -17,7 +18,7 @@ use crate::job;
 use crate::log::Log;
 use crate::output::OutputFile;
 use crate::progress::Progress;
-use crate::stats::{self, Memory, Primitives, Problems, Rays, Seconds, Stats};
+use crate::stats::{self, Filter, Memory, Primitives, Problems, Rays, Seconds, Stats};
 
 /// Warnings beyond this many are only counted, unless details are asked for.
 const WARNINGS_SHOWN: u64 = 20;
@@ -30,12 +31,13 @@ pub fn run(arguments: &RenderArguments, log: &Log) -> Result<(), Failure> {
 
 fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Result<(), Failure> {
     job::check_samples(arguments)?;
+    let filtering = job::filtering(&arguments.filter)?;
     let path = job::output(arguments)?;
     let output = OutputFile::prepare(&path)?;
     let stats_path = arguments.channels.stats.as_deref().map(|path| job::named(path, arguments.frame));
     let stats_file = stats_path.as_deref().map(OutputFile::prepare).transpose()?;
 
-    let job = job(arguments);
+    let job = job(arguments, filtering);
     log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
     let reporter = Reporter { log, progress, warnings: AtomicU64::new(0), interrupt: Interrupt::default() };
     if let Err(why) = reporter.interrupt.listen() {
@@ -64,7 +66,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     judge(arguments, &stats)
 }
 
-fn job(arguments: &RenderArguments) -> Job {
+fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
     let mut aovs = AovSet::default();
     for name in &arguments.channels.aov {
         if name == "all" {
@@ -84,6 +86,7 @@ fn job(arguments: &RenderArguments) -> Job {
         threads: job::threads(arguments.run.threads, job::slurm().as_deref()),
         aovs,
         time_limit: arguments.quality.time_limit,
+        filtering,
         ..Job::default()
     }
 }
@@ -157,7 +160,7 @@ impl Reporter<'_> {
                 }
                 Failure::Input(summary)
             }
-            RenderError::EmptySampleRange(_) => Failure::Usage(summary),
+            RenderError::EmptySampleRange(_) | RenderError::Filter(_) => Failure::Usage(summary),
             RenderError::Embree(_) | RenderError::OpenImageIo(_) | RenderError::Threads { .. } => {
                 Failure::Render(summary)
             }
@@ -182,6 +185,7 @@ fn attributes(arguments: &RenderArguments, frame: &Frame) -> Vec<(String, Attrib
         ("tessera/seed".into(), text(description.seed.to_string())),
         ("tessera/frame".into(), Attribute::Int(arguments.frame)),
         ("tessera/sampleRange".into(), text(format!("{}:{}", samples.start, samples.end))),
+        ("tessera/filter".into(), text(filter_settings(&description.filtering))),
         ("tessera/complete".into(), Attribute::Int(description.complete().into())),
         ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
         ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(frame)))),
@@ -199,17 +203,24 @@ fn attributes(arguments: &RenderArguments, frame: &Frame) -> Vec<(String, Attrib
 /// Chromaticities of red, green, blue and white: ITU-R BT.709.
 const REC709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 
+/// A filter as the image's metadata name it: its name and all its settings.
+fn filter_settings(filtering: &Filtering) -> String {
+    let settings = filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
+    filtering.name().to_owned() + &settings.collect::<String>()
+}
+
 /// What two files must share, besides the scene, for their samples to belong to one picture: not the sample range.
 fn settings_hash(frame: &Frame) -> u64 {
     let (film, bounds) = (&frame.film, frame.film.bounds());
     let settings = format!(
-        "{} seed {} resolution {:?} pixels {:?} {:?} channels {:?}",
+        "{} seed {} resolution {:?} pixels {:?} {:?} channels {:?} filter {}",
         env!("CARGO_PKG_VERSION"),
         frame.description.seed,
         film.resolution(),
         bounds.min,
         bounds.max,
         film.aovs(),
+        filter_settings(&frame.description.filtering),
     );
     job::hash(settings.as_bytes())
 }
@@ -272,6 +283,7 @@ impl<'a> Outcome<'a> {
                 embree_bytes: statistics.embree_bytes,
                 film_bytes: statistics.film_bytes,
             },
+            filter: Filter::of(statistics),
             problems: Problems {
                 warnings: reporter.warnings.load(Ordering::Relaxed),
                 rejected_samples: counters.rejected_samples,
@@ -302,6 +314,9 @@ fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
     }
     if stats.problems.values_beyond_half > 0 {
         log.warning(&format!("{} values were too large for 16 bits", stats.problems.values_beyond_half));
+    }
+    if let Some(filter) = &stats.filter {
+        log.info(&filter.summary());
     }
     let [x0, x1, y0, y1] = stats.pixel_bounds;
     let seconds = &stats.seconds;

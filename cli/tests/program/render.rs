@@ -37,20 +37,33 @@ fn a_render_writes_the_image_and_nothing_else() {
 #[test]
 fn the_same_job_gives_the_same_bytes_on_any_number_of_threads() {
     let bench = bench();
-    for (threads, name) in [("1", "a.exr"), ("2", "b.exr"), ("3", "c.exr")] {
-        bench.succeed(&["render", "scene.pbrt", "-o", name, "-t", threads, "--aov", "all", "--progress", "none"]);
+    let mut files = Vec::new();
+    for filter in ["none", "talk", "adaptive"] {
+        let render = |threads: &str, seed: &str| {
+            let job = ["render", "scene.pbrt", "-o", "a.exr", "--aov", "all", "--progress", "none"];
+            bench.succeed(&[&job[..], &["-t", threads, "--seed", seed, "--filter", filter]].concat());
+            bytes(&bench, "a.exr")
+        };
+        let one = render("1", "0");
+        assert!(one == render("2", "0") && one == render("3", "0"), "{filter}");
+        assert!(one != render("1", "77"), "{filter}");
+        files.push(one);
     }
-    assert!(bytes(&bench, "a.exr") == bytes(&bench, "b.exr") && bytes(&bench, "a.exr") == bytes(&bench, "c.exr"));
-    bench.succeed(&["render", "scene.pbrt", "-o", "d.exr", "--aov", "all", "--seed", "77"]);
-    assert!(bytes(&bench, "a.exr") != bytes(&bench, "d.exr"));
+    assert!(files[0] != files[1] && files[1] != files[2] && files[2] != files[0]);
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--aov", "all", "--seed", "0"]);
+    assert!(bytes(&bench, "a.exr") == files[2], "the default is not the adaptive filter");
 }
 
 #[test]
 fn crops_are_the_same_pixels_in_a_window_of_the_frame() {
     let bench = bench();
-    bench.succeed(&["render", "scene.pbrt", "-o", "full.exr"]);
-    bench.succeed(&["render", "scene.pbrt", "-o", "crop.exr", "--crop", "0.25,0.75,0.5,1"]);
-    bench.succeed(&["render", "scene.pbrt", "-o", "bounds.exr", "--pixel-bounds", "12,36,16,32"]);
+    // Filtered, pixels within the window would have no neighbours beyond it.
+    let render = |window: &[&str], name: &str| {
+        bench.succeed(&[&["render", "scene.pbrt", "--filter", "none", "-o", name], window].concat());
+    };
+    render(&[], "full.exr");
+    render(&["--crop", "0.25,0.75,0.5,1"], "crop.exr");
+    render(&["--pixel-bounds", "12,36,16,32"], "bounds.exr");
     let (full, crop, bounds) =
         (read(&bench.path("full.exr")), read(&bench.path("crop.exr")), read(&bench.path("bounds.exr")));
     assert_eq!(crop.pixels, bounds.pixels);
@@ -87,7 +100,40 @@ fn metadata_says_what_was_rendered_and_no_more() {
     bench.succeed(&["render", "scene.pbrt", "-o", "c.exr", "--seed", "9", "--resolution", "24x16"]);
     let hash = |name: &str| read(&bench.path(name)).attribute("tessera/settingsHash").cloned();
     assert_eq!(hash("b.exr"), Some(oiio::Attribute::Text(settings.clone())));
-    assert_ne!(hash("c.exr"), Some(oiio::Attribute::Text(settings)));
+    assert_ne!(hash("c.exr"), Some(oiio::Attribute::Text(settings.clone())));
+    // Nor does another filter, or another setting of it.
+    assert!(text("tessera/filter").starts_with("adaptive trees="), "{}", text("tessera/filter"));
+    for change in [["--filter", "none"], ["--filter-set", "trees=3"]] {
+        let job = ["render", "scene.pbrt", "-o", "d.exr", "--sample-range", "5:8", "--seed", "9"];
+        bench.succeed(&[&job[..], &change].concat());
+        assert_ne!(hash("d.exr"), Some(oiio::Attribute::Text(settings.clone())), "{change:?}");
+    }
+}
+
+#[test]
+fn each_filter_says_what_it_did() {
+    let bench = bench();
+    let render = |filter: &str, word: &str| {
+        let run = bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--filter", filter, "--stats", "s.json"]);
+        assert!(run.stderr.contains(word), "{}", run.stderr);
+        let stats: serde_json::Value = serde_json::from_slice(&bytes(&bench, "s.json")).unwrap();
+        stats["filter"].clone()
+    };
+    assert!(render("none", "wrote a.exr").is_null());
+    let [talk, adaptive] = [render("talk", "% unresolved"), render("adaptive", "pairs of pixel and cell")];
+    for filter in [&talk, &adaptive] {
+        // Half the picture shows the sky, which has no vertex.
+        let paths = filter["paths"].as_u64().unwrap();
+        assert!((48 * 32..48 * 32 * 4).contains(&paths), "{filter}");
+        assert!(filter["cells"].as_u64().unwrap() > 10 && filter["bytes"].as_u64().unwrap() > 1000, "{filter}");
+        assert!(filter["seconds"].as_f64().unwrap() > 0.0 && filter["share"].as_f64().unwrap() < 1.0, "{filter}");
+        assert_eq!(filter["unfiltered"], 0, "{filter}");
+    }
+    assert_eq!((&talk["name"], &adaptive["name"]), (&"talk".into(), &"adaptive".into()));
+    assert!(adaptive["pairs"].as_u64().unwrap() > 1000, "{adaptive}");
+    let probes: u64 = talk["probes"].as_array().unwrap().iter().map(|cells| cells.as_u64().unwrap()).sum();
+    assert_eq!(Some(probes), talk["cells"].as_u64());
+    assert!(talk["occupancy"].as_f64().unwrap() > 0.0 && talk["unresolved_share"] == 0.0, "{talk}");
 }
 
 #[test]

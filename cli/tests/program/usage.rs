@@ -10,7 +10,7 @@ fn help_names_commands_exit_codes_and_examples() {
         assert!(help.contains(word), "{help}");
     }
     let help = bench.succeed(&["render", "--help"]).stdout;
-    for word in ["Examples:", "--sample-range", "--time-limit", "SOURCE_DATE_EPOCH", "openjd"] {
+    for word in ["Examples:", "--sample-range", "--time-limit", "SOURCE_DATE_EPOCH", "openjd", "--filter-set"] {
         assert!(help.contains(word), "{help}");
     }
     assert!(bench.succeed(&["--version"]).stdout.starts_with("tessera "));
@@ -25,6 +25,25 @@ fn a_wrong_command_line_exits_with_2_and_says_why() {
     bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--sppp", "4"], 2, &["--sppp", "--spp"]);
     bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--crop", "0,1,0,2"], 2, &["--crop", "X0 < X1 <= 1"]);
     bench.fail(&["render", "a.pbrt", "-o", "a.exr", "--spp", "8", "--sample-range", "0:9"], 2, &["0:9", "--spp"]);
+}
+
+#[test]
+fn a_wrong_setting_of_the_filter_is_answered_by_those_there_are() {
+    let bench = Bench::new();
+    // The scene does not exist, which would be exit code 3.
+    let fail = |arguments: &[&str], words: &[&str]| {
+        bench.fail(&[&["render", "none.pbrt", "-o", "a.exr"], arguments].concat(), 2, words);
+    };
+    fail(&["--filter", "best"], &["best", "none", "talk", "adaptive"]);
+    fail(&["--filter-set", "tree=3"], &["\"adaptive\" has no setting \"tree\"", "trees (1 to 8)", "leaf (above 0)"]);
+    fail(&["--filter-set", "leaf=1,trees=9"], &["trees cannot be \"9\": it must be 1 to 8"]);
+    fail(&["--filter-set", "trees"], &["trees", "KEY=VALUE"]);
+    fail(&["--filter", "talk", "--filter-set", "trees=3"], &["\"talk\" has no setting \"trees\"", "probes (1 to 255)"]);
+    fail(&["--filter", "talk", "--filter-set", "jitter=big"], &["jitter", "none, square or disk"]);
+    fail(&["--filter", "talk", "--filter-set", "eviction=health"], &["reading at the end needs cells that stay"]);
+    fail(&["--filter", "none", "--filter-set", "trees=3"], &["it has none"]);
+    fail(&["--filter", "talk", "--temporal", "1.5"], &["--temporal", "less than 1"]);
+    fail(&["--filter", "talk", "--temporal", "0.8"], &["--temporal", "cannot be rendered in one run yet"]);
 }
 
 #[test]

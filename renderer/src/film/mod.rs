@@ -139,9 +139,9 @@ impl Film {
         Self { resolution, bounds, aovs, tiles, pixels, auxiliary, split: Vec::new(), filtered: Vec::new() }
     }
 
-    /// The same film with the sums that a filter needs.
-    pub fn with_split(self) -> Self {
-        Self { split: vec![Split::default(); self.pixels.len()], ..self }
+    /// From now on keeps the sums that a filter needs.
+    pub fn keep_split(&mut self) {
+        self.split = vec![Split::default(); self.pixels.len()];
     }
 
     /// Bytes that a film of this shape holds.

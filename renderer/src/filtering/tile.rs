@@ -7,9 +7,11 @@ use crate::integrator::{Cut, Recorder, Unrecorded};
 use crate::math::Rgb;
 
 /// Keeps what a path's recorder has seen.
-pub trait Keeper: Default + Send {
+pub trait Keeper: Send {
     /// What looks at the paths.
-    type Recorder: Recorder + Default;
+    type Recorder: Recorder;
+    /// What looks at one path.
+    fn recorder(&self) -> Self::Recorder;
     /// Takes the recorder of a finished path.
     fn keep(&mut self, recorder: &Self::Recorder, sample: Keep<'_>);
 }
@@ -39,18 +41,49 @@ pub struct Nothing;
 impl Keeper for Nothing {
     type Recorder = Unrecorded;
     #[inline]
+    fn recorder(&self) -> Unrecorded {
+        Unrecorded
+    }
+    #[inline]
     fn keep(&mut self, _: &Unrecorded, _: Keep<'_>) {}
 }
 
+/// Which vertex of a path others share: the first of those that are no mirror and no smooth glass, or a later one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Selection {
+    /// The first, the primary one: what is seen, straight on or in mirrors.
+    #[default]
+    Primary,
+    /// The first that is not primary.
+    Secondary,
+    /// The second that is not primary.
+    Tertiary,
+}
+
 /// Paths are kept for the filter.
-#[derive(Default)]
-pub struct Paths(pub Vec<PathRecord>);
+#[derive(Debug, Default)]
+pub struct Paths {
+    /// Those with a selected vertex.
+    pub records: Vec<PathRecord>,
+    selection: Selection,
+}
+
+impl Paths {
+    /// No path yet.
+    pub fn new(selection: Selection) -> Self {
+        Self { records: Vec::new(), selection }
+    }
+}
 
 impl Keeper for Paths {
     type Recorder = Cut;
     #[inline]
+    fn recorder(&self) -> Cut {
+        Cut::after(self.selection as u8)
+    }
+    #[inline]
     fn keep(&mut self, cut: &Cut, sample: Keep<'_>) {
-        self.0.extend(cut.record(sample.slot, sample.index, sample.weight * sample.exposure));
+        self.records.extend(cut.record(sample.slot, sample.index, sample.weight * sample.exposure));
         if let Some(split) = sample.split {
             split.add(sample.index, sample.exposed, cut.prefix() * sample.exposure, sample.weight);
         }

@@ -40,7 +40,7 @@ impl Recorder for Unrecorded {
 }
 
 /// A path cut in three: up to the first vertex that is no mirror and no smooth glass, from there to the next diffuse one,
-/// and what follows.
+/// and what follows. [`Cut::after`] lets such vertices pass before it cuts.
 ///
 /// Each piece counts its light from its own beginning, with throughput 1 there, so that nothing is ever divided by a
 /// throughput. [`Cut::record`] puts the pieces together.
@@ -58,6 +58,8 @@ pub struct Cut {
     beta: Rgb,
     /// Where the path is, is a selected vertex.
     here: bool,
+    /// Vertices at which the path could be cut and is not.
+    passing: u8,
 }
 
 /// A vertex at which a path is cut.
@@ -126,6 +128,7 @@ impl Default for Cut {
             beyond: Rgb::ZERO,
             beta: Rgb::ONE,
             here: false,
+            passing: 0,
         }
     }
 }
@@ -134,6 +137,10 @@ impl Recorder for Cut {
     fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32) {
         let bsdf = &vertex.shading.bsdf;
         let next = match (&self.first, &self.second) {
+            (None, _) if !bsdf.is_specular() && self.passing > 0 => {
+                self.passing -= 1;
+                return;
+            }
             (None, _) if !bsdf.is_specular() => &mut self.first,
             (Some(_), None) if bsdf.diffuse_albedo(vertex.wo) != Rgb::ZERO => &mut self.second,
             _ => {
@@ -181,6 +188,11 @@ impl Recorder for Cut {
 }
 
 impl Cut {
+    /// A path that is cut only after `passing` vertices at which it could be: their light is the prefix's.
+    pub fn after(passing: u8) -> Self {
+        Self { passing, ..Self::default() }
+    }
+
     /// Light that no selected vertex sent on, along the camera ray.
     pub fn prefix(&self) -> Rgb {
         self.prefix

@@ -1,16 +1,24 @@
-//! What the filter gains: one JSON line per scene, samples and filter.
+//! What a filter gains: one JSON line per number of samples and method.
 //!
 //! `bench_filter SCENE.pbrt WIDTHxHEIGHT SPP[,SPP...] REFERENCES-A REFERENCES-B [KEY=VALUE ...]`
 //!
-//! References are EXR files of the scene, comma-separated: the mean of each list is one of two independent halves. Keys are
-//! settings of the filter, `seed`, and `out`, a folder for the images. Never a test: it only prints.
+//! References are EXR files of the scene, comma-separated: the mean of each list is one of two independent halves. Keys:
+//! - `methods`: comma-separated of `none`, `talk`, `adaptive`, and `NAME:FOLDER` for images that others made, files
+//!   `FOLDER/SCENE-SPP.exr`; of those that are absent nothing is printed. All but `NAME:FOLDER` unless told.
+//! - `seed`;
+//! - `out`: a folder for the images, `SCENE-SPP-METHOD.exr`, with what denoisers want besides;
+//! - settings of the filters, as `tessera render --filter-set` has them; each goes to the filters that have it.
+//!
+//! Gains are over `none`, which comes first. Never a test: it only prints.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout)]
 
 use std::path::{Path, PathBuf};
 
-use renderer::filtering::{Blend, Filtering};
-use renderer::render::{self, Frame, Job, Unobserved};
+use renderer::film::{AovSet, exr};
+use renderer::filtering::{Filtering, Report};
+use renderer::render::{self, Frame, Job, Statistics, Unobserved};
+use serde_json::{Map, Value, json};
 use tests::error::Errors;
 use tests::image::{RgbImage, read_exr};
 
@@ -22,81 +30,205 @@ fn main() -> Result<(), Failure> {
         return Err("usage: bench_filter SCENE.pbrt WxH SPP[,SPP...] REFERENCES-A REFERENCES-B [KEY=VALUE ...]".into());
     };
     let (width, height) = resolution.split_once('x').ok_or("the resolution is WIDTHxHEIGHT")?;
-    let resolution = Some([width.parse()?, height.parse()?]);
-    let (mut params, mut seed, mut out) = (filter::Params::default(), 1, None);
-    let mut blend = Blend::default();
-    for setting in settings {
-        let (key, value) = setting.split_once('=').ok_or("settings are KEY=VALUE")?;
-        match key {
-            "seed" => seed = value.parse()?,
-            "out" => out = Some(PathBuf::from(value)),
-            "trees" => params.trees = value.parse()?,
-            "second_trees" => params.second_trees = value.parse()?,
-            "leaf" => params.leaf = value.parse()?,
-            "second_leaf" => params.second_leaf = value.parse()?,
-            "radius" => blend.radius = value.parse()?,
-            "doubt" => blend.doubt = value.parse()?,
-            "glossy_doubt" => blend.glossy_doubt = value.parse()?,
-            "tau" => params.shrinkage.tau = value.parse()?,
-            "trusted" => params.shrinkage.trusted = value.parse()?,
-            "levels" => params.shrinkage.levels = value.parse()?,
-            _ => return Err(format!("no setting is called {key}").into()),
-        }
-    }
-    let (a, b) = (reference(a), reference(b));
-    for spp in spps.split(',') {
-        let spp: u64 = spp.parse()?;
-        let mut plain = None;
-        for (name, filtering) in [("none", Filtering::None), ("adaptive", Filtering::Adaptive(params, blend))] {
-            let job = Job {
-                scene: PathBuf::from(scene),
-                spp: Some(spp),
-                seed: Some(seed),
-                resolution,
-                filtering,
-                ..Job::default()
-            };
-            let frame = render::render(&job, &Unobserved)?;
-            let image = pixels(&frame);
-            let errors = Errors::new(&image, &a, &b);
-            let (trimmed, all) = (errors.relmse(0.999), errors.relmse(1.0));
-            let seconds = frame.statistics.render_seconds;
-            let base = plain.get_or_insert((trimmed, all, seconds, errors.blocks(32)));
-            let worse = errors.blocks(32).iter().zip(&base.3).filter(|(f, u)| **f > 1.25 * **u).count();
-            let mean = |image: &[[f32; 3]]| {
-                image.iter().map(|p| p.iter().map(|x| f64::from(*x)).sum::<f64>()).sum::<f64>()
-                    / (3 * image.len()) as f64
-            };
-            let references = 0.5 * (mean(&a.pixels) + mean(&b.pixels));
-            let report = frame.statistics.filter.unwrap_or_default();
-            let line = serde_json::json!({
-                "scene": Path::new(scene).parent().and_then(Path::file_name).map(|name| name.to_string_lossy()),
-                "spp": spp,
-                "filter": name,
-                "relmse": trimmed,
-                "gain": base.0 / trimmed,
-                "gain_untrimmed": base.1 / all,
-                "gain_equal_time": base.0 / trimmed * base.2 / seconds,
-                "mean_ratio": mean(&image) / references,
-                "blocks_worse": worse,
-                "blocks": base.3.len(),
-                "seconds": seconds,
-                "filter_seconds": frame.statistics.filter_seconds,
-                "cells": report.cells,
-                "second_cells": report.second_cells,
-                "pairs": report.pairs,
-                "bytes": report.bytes,
-                "unfiltered": report.unfiltered,
-            });
-            println!("{line}");
-            if let Some(folder) = &out {
-                let stem = Path::new(scene).parent().and_then(Path::file_name).ok_or("the scene is in no folder")?;
-                let name = folder.join(format!("{}-{spp}-{name}.exr", stem.to_string_lossy()));
-                renderer::film::exr::write(&frame.film, Vec::new(), &name)?;
+    let settings = Settings::parse(settings)?;
+    let folder = Path::new(scene).parent().and_then(Path::file_name).ok_or("the scene is in no folder")?;
+    let bench = Bench {
+        name: folder.to_string_lossy().into_owned(),
+        job: Job {
+            scene: PathBuf::from(scene),
+            seed: Some(settings.seed),
+            resolution: Some([width.parse()?, height.parse()?]),
+            ..Job::default()
+        },
+        a: reference(a),
+        b: reference(b),
+        settings,
+    };
+    spps.split(',').try_for_each(|spp| bench.run(spp.parse()?))
+}
+
+/// What comes after the references.
+struct Settings {
+    methods: Vec<Method>,
+    seed: u64,
+    out: Option<PathBuf>,
+}
+
+/// How an image comes about.
+enum Method {
+    Ours(Filtering),
+    Others { name: String, folder: PathBuf },
+}
+
+impl Settings {
+    fn parse(arguments: &[String]) -> Result<Self, Failure> {
+        let pairs = arguments.iter().map(|setting| setting.split_once('=').ok_or("settings are KEY=VALUE"));
+        let pairs: Vec<(&str, &str)> = pairs.collect::<Result<_, _>>()?;
+        let (mut methods, mut seed, mut out) = ("none,talk,adaptive", 1, None);
+        let mut knobs = Vec::new();
+        for (key, value) in pairs {
+            match key {
+                "methods" => methods = value,
+                "seed" => seed = value.parse()?,
+                "out" => out = Some(PathBuf::from(value)),
+                _ => knobs.push((key, value)),
             }
         }
+        let mut methods = methods.split(',').map(Method::parse).collect::<Result<Vec<_>, _>>()?;
+        for (key, value) in knobs {
+            let mut known = false;
+            for method in &mut methods {
+                if let Method::Ours(filtering) = method {
+                    if filtering.settings().iter().any(|(name, _)| *name == key) {
+                        filtering.set(key, value)?;
+                        known = true;
+                    }
+                }
+            }
+            if !known {
+                return Err(format!("none of the methods has a setting {key}").into());
+            }
+        }
+        Ok(Self { methods, seed, out })
     }
-    Ok(())
+}
+
+impl Method {
+    fn parse(text: &str) -> Result<Self, Failure> {
+        match text.split_once(':') {
+            Some((name, folder)) => Ok(Self::Others { name: name.into(), folder: folder.into() }),
+            None => Ok(Self::Ours(Filtering::named(text).ok_or_else(|| format!("no method is called {text}"))?)),
+        }
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Ours(filtering) => filtering.name(),
+            Self::Others { name, .. } => name,
+        }
+    }
+}
+
+/// A scene and what its images are judged by.
+struct Bench {
+    name: String,
+    job: Job,
+    a: RgbImage,
+    b: RgbImage,
+    settings: Settings,
+}
+
+/// How far an image is from the references, and what it took if we made it.
+#[derive(Clone)]
+struct Figures {
+    relmse: f64,
+    untrimmed: f64,
+    blocks: Vec<f64>,
+    seconds: Option<f64>,
+}
+
+impl Bench {
+    /// Prints a line for every method.
+    fn run(&self, spp: u64) -> Result<(), Failure> {
+        let mut base = None;
+        for method in &self.settings.methods {
+            let (image, statistics) = match method {
+                Method::Ours(filtering) => {
+                    let frame = self.render(spp, *filtering)?;
+                    (pixels(&frame), Some(frame.statistics))
+                }
+                Method::Others { folder, .. } => {
+                    let file = folder.join(format!("{}-{spp}.exr", self.name));
+                    if !file.is_file() {
+                        continue;
+                    }
+                    (read_exr(&file).pixels, None)
+                }
+            };
+            let errors = Errors::new(&image, &self.a, &self.b);
+            let seconds = statistics.as_ref().map(|statistics| statistics.render_seconds);
+            let figures = Figures {
+                relmse: errors.relmse(0.999),
+                untrimmed: errors.relmse(1.0),
+                blocks: errors.blocks(32),
+                seconds,
+            };
+            let mut line = self.line(spp, method, &image);
+            let base = base.get_or_insert_with(|| figures.clone());
+            figures.compare(base, &mut line);
+            if let Some(statistics) = &statistics {
+                costs(statistics, &mut line);
+            }
+            println!("{}", Value::Object(line));
+        }
+        Ok(())
+    }
+
+    fn render(&self, spp: u64, filtering: Filtering) -> Result<Frame, Failure> {
+        let aovs =
+            AovSet { albedo: self.settings.out.is_some(), normal: self.settings.out.is_some(), ..AovSet::default() };
+        let frame = render::render(&Job { spp: Some(spp), filtering, aovs, ..self.job.clone() }, &Unobserved)?;
+        if let Some(folder) = &self.settings.out {
+            let file = folder.join(format!("{}-{spp}-{}.exr", self.name, filtering.name()));
+            exr::write(&frame.film, Vec::new(), &file)?;
+        }
+        Ok(frame)
+    }
+
+    fn line(&self, spp: u64, method: &Method, image: &[[f32; 3]]) -> Map<String, Value> {
+        let references = 0.5 * (mean(&self.a.pixels) + mean(&self.b.pixels));
+        let line = json!({
+            "scene": self.name,
+            "spp": spp,
+            "filter": method.name(),
+            "mean_ratio": mean(image) / references,
+        });
+        line.as_object().cloned().unwrap_or_default()
+    }
+}
+
+impl Figures {
+    fn compare(&self, base: &Self, line: &mut Map<String, Value>) {
+        let gain = base.relmse / self.relmse;
+        let worse = self.blocks.iter().zip(&base.blocks).filter(|(own, base)| **own > 1.25 * **base).count();
+        line.extend([
+            ("relmse".into(), json!(self.relmse)),
+            ("gain".into(), json!(gain)),
+            ("gain_untrimmed".into(), json!(base.untrimmed / self.untrimmed)),
+            ("blocks_worse".into(), json!(worse)),
+            ("blocks".into(), json!(base.blocks.len())),
+        ]);
+        if let (Some(own), Some(base)) = (self.seconds, base.seconds) {
+            line.insert("gain_equal_time".into(), json!(gain * base / own));
+        }
+    }
+}
+
+fn costs(statistics: &Statistics, line: &mut Map<String, Value>) {
+    line.insert("seconds".into(), json!(statistics.render_seconds));
+    line.insert("filter_seconds".into(), json!(statistics.filter_seconds));
+    let figures = match &statistics.filter {
+        None => json!({}),
+        Some(Report::Adaptive(report)) => json!({
+            "cells": report.cells,
+            "second_cells": report.second_cells,
+            "pairs": report.pairs,
+            "bytes": report.bytes,
+            "unfiltered": report.unfiltered,
+        }),
+        Some(Report::Talk(report)) => json!({
+            "cells": report.cells,
+            "bytes": report.bytes,
+            "occupancy": report.occupancy(),
+            "mean_probes": report.mean_probes(),
+            "unresolved_share": report.unresolved_share(),
+        }),
+    };
+    line.extend(figures.as_object().cloned().unwrap_or_default());
+}
+
+fn mean(image: &[[f32; 3]]) -> f64 {
+    image.iter().flatten().map(|x| f64::from(*x)).sum::<f64>() / (3 * image.len()) as f64
 }
 
 /// The mean of several images.
