@@ -62,15 +62,42 @@ fn modules_of_the_renderer_use_only_what_stands_before_them() {
         }
     }
     assert!(order.len() > 10, "lib.rs no longer declares its modules one a line");
+    let last: Vec<&str> = order.iter().map(String::as_str).skip_while(|&name| name != "integrator").collect();
+    assert_eq!(last, ["integrator", "film", "filtering", "render"], "the last modules of lib.rs");
     assert!(wrong.is_empty(), "against the order in lib.rs:\n{}", wrong.join("\n"));
 }
 
 #[test]
 fn unsafe_code_is_where_it_is_allowed_and_nowhere_else() {
-    for room in ["renderer/src/lib.rs", "cli/src/main.rs", "tests/src/lib.rs", "tests/src/bin/bench.rs"] {
+    let benches = ["tests/src/bin/bench.rs", "tests/src/bin/bench_filter.rs"];
+    let rooms = ["filter/src/lib.rs", "renderer/src/lib.rs", "cli/src/main.rs", "tests/src/lib.rs"];
+    for room in rooms.into_iter().chain(benches) {
         let text = fs::read_to_string(root().join(room)).unwrap();
         assert!(text.contains("#![forbid(unsafe_code)]"), "{room} does not forbid unsafe code");
     }
+}
+
+#[test]
+fn the_filter_knows_no_renderer_no_file_and_no_clock() {
+    let manifest = fs::read_to_string(root().join("filter/Cargo.toml")).unwrap();
+    let section = manifest.split("[dependencies]").nth(1).expect("the filter's dependencies");
+    let names: Vec<&str> = section
+        .lines()
+        .take_while(|line| !line.starts_with('['))
+        .filter_map(|line| line.split(['.', ' ', '=']).next())
+        .filter(|name| !name.is_empty())
+        .collect();
+    assert_eq!(names, ["glam", "rayon"], "what the filter depends on");
+    let outside = ["std::time", "std::fs", "std::io", "std::net", "std::process", "std::thread"];
+    let mut found = Vec::new();
+    for file in rust_files(&root().join("filter/src")) {
+        for (number, line) in code(&file) {
+            if outside.iter().any(|word| line.contains(word)) {
+                found.push(format!("{}:{number}: {line}", file.display()));
+            }
+        }
+    }
+    assert!(found.is_empty(), "the filter looks outside:\n{}", found.join("\n"));
 }
 
 #[test]
@@ -79,7 +106,7 @@ fn nothing_is_left_undone_or_left_out() {
     let words = ["todo", "unimplemented", "dbg"].map(|word| format!("{word}!("));
     let ignored = format!("#[{}", "ignore");
     let mut found = Vec::new();
-    for room in ["embree-sys", "embree", "oiio", "renderer", "cli", "tests"] {
+    for room in ["embree-sys", "embree", "oiio", "filter", "renderer", "cli", "tests"] {
         for file in rust_files(&root().join(room)) {
             let text = fs::read_to_string(&file).unwrap();
             for (line, number) in text.lines().zip(1..) {
@@ -114,7 +141,7 @@ fn every_source_that_is_cited_is_in_the_bibliography() {
             && rest.len() <= 3
     };
     let (mut found, mut missing) = (0, Vec::new());
-    for room in ["embree-sys", "embree", "oiio", "renderer", "cli"] {
+    for room in ["embree-sys", "embree", "oiio", "filter", "renderer", "cli", "tests/src"] {
         for file in rust_files(&root().join(room)) {
             let text = fs::read_to_string(&file).unwrap();
             // A citation is \[Key\] in documentation and [Key] elsewhere.

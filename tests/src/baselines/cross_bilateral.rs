@@ -1,7 +1,6 @@
 //! Filtering in screen space, guided by what is seen there: a cross-bilateral filter.
 //!
-//! **Source**: E. Eisemann, F. Durand, "Flash Photography Enhancement via Intrinsic Relighting", SIGGRAPH 2004, with the
-//! guides that renderers have.
+//! **Source**: \[Eisemann04\], with the guides that renderers have.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! Path space filtering before hashing: every path looks for its neighbours.
 //!
-//! **Source**: A. Keller, K. Dahm, N. Binder, "Path Space Filtering", SIGGRAPH 2014 Talks.
+//! **Source**: \[Keller14\].
 
 use std::cmp::Ordering;
 
