@@ -127,7 +127,7 @@ fn each_filter_says_what_it_did() {
         assert!((48 * 32..48 * 32 * 4).contains(&paths), "{filter}");
         assert!(filter["cells"].as_u64().unwrap() > 10 && filter["bytes"].as_u64().unwrap() > 1000, "{filter}");
         assert!(filter["seconds"].as_f64().unwrap() > 0.0 && filter["share"].as_f64().unwrap() < 1.0, "{filter}");
-        assert_eq!(filter["unfiltered"], 0, "{filter}");
+        assert!(filter["unfiltered"].as_u64().unwrap() <= paths / 100, "{filter}");
     }
     assert_eq!((&talk["name"], &adaptive["name"]), (&"talk".into(), &"adaptive".into()));
     assert!(adaptive["pairs"].as_u64().unwrap() > 1000, "{adaptive}");
