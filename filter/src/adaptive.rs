@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::grid::{Anchor, Grid, Place};
+use crate::grid::{Anchor, Grid, LeafCell, Place};
 use crate::pairs::{Lobe as PairLobe, Pairs};
 use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shrink::{Shrinkage, estimate};
@@ -85,7 +85,7 @@ impl Tree {
 #[inline]
 fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
     let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
-    Place::new(vertex.p, vertex.n.get(), side * vertex.footprint.get(), attributes)
+    Place::new(vertex.p, vertex.n.direction(), side * vertex.footprint.get(), attributes)
 }
 
 /// Sums over all paths so far.
@@ -220,9 +220,9 @@ fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &
     let mut keyed = Vec::with_capacity(records.len());
     for (tree, places) in trees.iter().zip(places.chunks_exact_mut(records.len().max(1))) {
         keyed.clear();
-        keyed.extend(deposits.iter().map(|deposit| match deposit {
-            Some((place, deposit)) => (tree.grid.leaf(place), *deposit),
-            None => (None, Deposit::default()),
+        keyed.extend(deposits.iter().map(|deposit| {
+            let (place, deposit) = deposit.as_ref()?;
+            Some((tree.grid.leaf(place)?, *deposit))
         }));
         tree.cells.add(&keyed, places);
     }
@@ -241,8 +241,8 @@ fn weight(record: &PathRecord) -> f32 {
 struct FirstVertices<'a> {
     params: &'a Params,
     quantum: &'a Quantum,
-    diffuse: Vec<(&'a Tree, Table)>,
-    glossy: Vec<(&'a Tree, Table)>,
+    diffuse: Vec<(&'a Tree, Table<LeafCell>)>,
+    glossy: Vec<(&'a Tree, Table<LeafCell>)>,
     /// Places of a small table's cells in the large one.
     indices: Vec<CellIndex>,
     unfiltered: u64,
@@ -299,7 +299,12 @@ impl<'a> FirstVertices<'a> {
 
 /// Adds to a cell of every tree; the tree that the path reads, and the number of its cell there.
 #[inline]
-fn deposit_in_all(trees: &mut [(&Tree, Table)], place: &Place, sample: u8, deposit: &Deposit) -> Option<(u32, u32)> {
+fn deposit_in_all(
+    trees: &mut [(&Tree, Table<LeafCell>)],
+    place: &Place,
+    sample: u8,
+    deposit: &Deposit,
+) -> Option<(u32, u32)> {
     let read = u32::from(sample) % trees.len() as u32;
     let mut found = None;
     // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of

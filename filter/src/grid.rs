@@ -27,18 +27,12 @@ const COORDINATE_BITS: u32 = 21;
 const LEVEL_BIAS: i32 = 1 << 14;
 
 impl CellKey {
-    /// Cell ⌊`position`⌋ of a level. `None` beyond ±2²⁰ cells, further away than any footprint is small.
+    /// A cell of a level, by its coordinates in ±2²⁰.
     #[inline]
-    fn new(level: i32, attributes: u64, position: DVec3) -> Option<Self> {
-        const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
-        let cell = position.floor();
-        if !(cell.min_element() >= -HALF && cell.max_element() < HALF) {
-            return None;
-        }
-        let part = |x: f64| spread(i64::from(x as i32) as u64);
-        let morton = part(cell.x) | part(cell.y) << 1 | part(cell.z) << 2;
+    fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
+        let [x, y, z] = cell.map(|x| spread(x as u64));
         let level = (level + LEVEL_BIAS) as u16;
-        Some(Self(u128::from(level) << 112 | u128::from(attributes & ATTRIBUTES) << 64 | u128::from(morton)))
+        Self(u128::from(level) << 112 | u128::from(attributes & ATTRIBUTES) << 64 | u128::from(x | y << 1 | z << 2))
     }
 
     /// log₂ of the cell's side, in units of its tree.
@@ -114,10 +108,39 @@ impl Grid {
 
     /// The finest cell of a place; `None` for one outside the extent.
     #[inline]
-    pub fn leaf(&self, place: &Place) -> Option<CellKey> {
+    pub fn leaf(&self, place: &Place) -> Option<LeafCell> {
+        const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
         let level = place.level.max(self.finest);
-        let position = (place.p - self.corner) * (self.inverse_scale * power_of_two(-level));
-        CellKey::new(level, place.attributes, position)
+        let cell = ((place.p - self.corner) * (self.inverse_scale * power_of_two(-level))).floor();
+        // ±2²⁰ cells: further away than any footprint is small.
+        let within = cell.min_element() >= -HALF && cell.max_element() < HALF;
+        within.then(|| LeafCell { attributes: place.attributes, level, cell: cell.as_ivec3().to_array() })
+    }
+}
+
+/// A cell by its coordinates: quicker to find again than to spell as a [`CellKey`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeafCell {
+    attributes: u64,
+    level: i32,
+    cell: [i32; 3],
+}
+
+impl LeafCell {
+    /// The cell's key.
+    #[inline]
+    pub fn key(&self) -> CellKey {
+        CellKey::new(self.level, self.attributes, self.cell)
+    }
+
+    /// Bits that differ between the cells of a neighbourhood: good enough for a small table.
+    #[inline]
+    pub fn quick_hash(&self) -> u64 {
+        let [x, y, z] = self.cell.map(|x| u64::from(x as u32));
+        let words = x | y << 32;
+        let more = (z | u64::from(self.level as u32) << 32) ^ self.attributes.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mixed = (words.wrapping_mul(0xd6e8_feb8_6659_fd93) ^ more).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        mixed ^ mixed >> 32
     }
 }
 
@@ -177,8 +200,8 @@ mod tests {
         #[test]
         fn cells_nest(x in -20.0f32..20.0, y in -20.0f32..20.0, z in -20.0f32..20.0, tree in 0u32..4, up in 1i32..8) {
             let grid = Grid::new(&ANCHOR, tree, 4);
-            let fine = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01, 5)).unwrap();
-            let coarse = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5)).unwrap();
+            let fine = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01, 5)).unwrap().key();
+            let coarse = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5)).unwrap().key();
             let ancestor = (0..up).fold(fine, |key, _| key.parent());
             prop_assert_eq!(ancestor, coarse);
             prop_assert_eq!(ancestor.level(), fine.level() + up);
@@ -192,15 +215,15 @@ mod tests {
             let scaled = Anchor { origin: ANCHOR.origin * scale, extent: ANCHOR.extent * scale };
             let (a, b) = (Grid::new(&ANCHOR, tree, 4), Grid::new(&scaled, tree, 4));
             let s = scale as f32;
-            let at = a.leaf(&Place::new([x, y, 1.0], Vec3::X, side, 1)).unwrap();
-            let there = b.leaf(&Place::new([x * s, y * s, s], Vec3::X, side * s, 1)).unwrap();
+            let at = a.leaf(&Place::new([x, y, 1.0], Vec3::X, side, 1)).unwrap().key();
+            let there = b.leaf(&Place::new([x * s, y * s, s], Vec3::X, side * s, 1)).unwrap().key();
             prop_assert_eq!(there.level(), at.level() + e);
             prop_assert_eq!(there.bits() << 16, at.bits() << 16);
         }
 
         #[test]
         fn parents_keep_the_order(a in any::<[i32; 3]>(), b in any::<[i32; 3]>()) {
-            let key = |c: [i32; 3]| CellKey::new(0, 9, DVec3::from_array(c.map(|x| f64::from(x >> 11)))).unwrap();
+            let key = |c: [i32; 3]| CellKey::new(0, 9, c.map(|x| x >> 11));
             let (a, b) = (key(a), key(b));
             prop_assert_eq!(a.cmp(&b).then(a.parent().cmp(&b.parent())), a.cmp(&b));
         }

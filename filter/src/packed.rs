@@ -95,12 +95,18 @@ impl PackedNormal {
     /// The direction, unit.
     #[inline]
     pub fn get(self) -> Vec3 {
+        self.direction().normalize_or(Vec3::Z)
+    }
+
+    /// The direction, of a length between 1/√3 and 1.
+    #[inline]
+    pub fn direction(self) -> Vec3 {
         let coordinate = |bits: u16| f32::from(bits & 255) / 127.5 - 1.0;
         let p = Vec2::new(coordinate(self.0), coordinate(self.0 >> 8));
         let z = 1.0 - p.x.abs() - p.y.abs();
         let fold = (-z).max(0.0);
         let xy = p - Vec2::new(fold.copysign(p.x), fold.copysign(p.y));
-        xy.extend(z).normalize_or(Vec3::Z)
+        xy.extend(z)
     }
 }
 

@@ -77,7 +77,7 @@ impl Quantum {
 }
 
 /// What one path brings to a cell, in quanta.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deposit {
     weight: u64,
     rgb: [u64; 3],

@@ -3,31 +3,57 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use crate::grid::CellKey;
+use crate::grid::{CellKey, LeafCell};
 use crate::sums::{Deposit, Sums, WideSums};
 
-/// A cell: 64 bytes, a cache line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Cell {
-    key: CellKey,
+/// What cells are found by.
+pub(crate) trait Key: Copy + Eq {
+    /// Bits that differ between keys.
+    fn hash(&self) -> u64;
+}
+
+impl Key for CellKey {
+    #[inline]
+    fn hash(&self) -> u64 {
+        CellKey::hash(*self)
+    }
+}
+
+impl Key for LeafCell {
+    #[inline]
+    fn hash(&self) -> u64 {
+        self.quick_hash()
+    }
+}
+
+/// A cell; with a [`CellKey`] 64 bytes, a cache line.
+#[derive(Clone, Copy, Debug)]
+struct Cell<K> {
+    key: K,
     sums: Sums,
 }
 
 /// Cells found by key: open addressing with linear probing over full keys. It grows, so no cell is ever refused, and
 /// nothing depends on who came first but the cells' numbers, which no result may depend on.
-#[derive(Debug, Default)]
-pub(crate) struct Table {
+#[derive(Debug)]
+pub(crate) struct Table<K> {
     /// Number of the cell plus one, 0 for none; a power of two of slots, at most half of them taken.
     slots: Vec<u32>,
-    cells: Vec<Cell>,
+    cells: Vec<Cell<K>>,
     /// What did not fit into cells, by their numbers.
     wide: BTreeMap<u32, WideSums>,
 }
 
-impl Table {
+impl<K> Default for Table<K> {
+    fn default() -> Self {
+        Self { slots: Vec::new(), cells: Vec::new(), wide: BTreeMap::new() }
+    }
+}
+
+impl<K: Key> Table<K> {
     /// Number of the cell of `key`, which is made if there is none.
     #[inline]
-    pub fn cell(&mut self, key: CellKey) -> u32 {
+    pub fn cell(&mut self, key: K) -> u32 {
         if 2 * self.cells.len() >= self.slots.len() {
             self.grow();
         }
@@ -94,7 +120,7 @@ impl Table {
     }
 
     /// All cells with their sums, in the order of their numbers.
-    pub fn cells(&self) -> impl Iterator<Item = (CellKey, WideSums)> + '_ {
+    pub fn cells(&self) -> impl Iterator<Item = (K, WideSums)> + '_ {
         self.cells.iter().zip(0u32..).map(|(cell, number)| {
             let mut sums = WideSums::from(&cell.sums);
             if let Some(wide) = self.wide.get(&number) {
@@ -113,14 +139,14 @@ impl Table {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.slots.capacity() * size_of::<u32>() + self.cells.capacity() * size_of::<Cell>()
+        self.slots.capacity() * size_of::<u32>() + self.cells.capacity() * size_of::<Cell<K>>()
     }
 }
 
 /// A table that threads add to at once: shards by the upper bits of the hash, each behind a lock that is held for a batch.
 #[derive(Debug)]
 pub(crate) struct ShardedTable {
-    shards: Vec<Mutex<Table>>,
+    shards: Vec<Mutex<Table<CellKey>>>,
 }
 
 /// Where a cell is: shard in the lower bits, number above.
@@ -131,15 +157,43 @@ const SHARD_BITS: u32 = 6;
 /// Number of shards: enough that a few dozen threads seldom meet, few enough that a batch per shard is worth a lock.
 const SHARDS: usize = 1 << SHARD_BITS;
 
-/// Indices of items by their shard, each shard's in order; items without a shard are left out.
-fn by_shard(shards: impl Iterator<Item = Option<usize>>) -> Vec<Vec<u32>> {
-    let mut batches = vec![Vec::new(); SHARDS];
-    for (at, shard) in (0..).zip(shards) {
-        if let Some(shard) = shard {
-            batches[shard].push(at);
+/// Keys with their numbers in the order of their shards, each shard's in the order they came.
+struct ByShard {
+    keys: Vec<(CellKey, u32)>,
+    /// Where each shard's begin, and the end.
+    begins: [u32; SHARDS + 1],
+}
+
+impl ByShard {
+    /// By counting.
+    fn new(unsorted: Vec<(CellKey, u32)>) -> Self {
+        let shards: Vec<u8> = unsorted.iter().map(|(key, _)| shard_of(*key) as u8).collect();
+        let mut begins = [0; SHARDS + 1];
+        for &shard in &shards {
+            begins[usize::from(shard) + 1] += 1;
+        }
+        for shard in 0..SHARDS {
+            begins[shard + 1] += begins[shard];
+        }
+        let mut next = begins;
+        let mut keys = vec![(CellKey::default(), 0); unsorted.len()];
+        for (item, shard) in unsorted.into_iter().zip(shards) {
+            let at = &mut next[usize::from(shard)];
+            keys[*at as usize] = item;
+            *at += 1;
+        }
+        Self { keys, begins }
+    }
+
+    /// Visits the shards that have keys.
+    fn for_each(&self, mut visit: impl FnMut(usize, &[(CellKey, u32)])) {
+        for (shard, range) in self.begins.windows(2).enumerate() {
+            let batch = &self.keys[range[0] as usize..range[1] as usize];
+            if !batch.is_empty() {
+                visit(shard, batch);
+            }
         }
     }
-    batches
 }
 
 #[inline]
@@ -160,24 +214,24 @@ impl Default for ShardedTable {
 }
 
 impl ShardedTable {
-    /// Adds deposits to the cells of their keys, where there is a key; places of the cells in the same order.
+    /// Adds deposits to their cells, where they have one; places of the cells in the same order.
     ///
     /// # Panics
     /// As [`Self::merge`].
-    pub fn add(&self, deposits: &[(Option<CellKey>, Deposit)], places: &mut [Option<CellIndex>]) {
-        let shards = deposits.iter().map(|(key, _)| key.map(shard_of));
-        for (shard, batch) in by_shard(shards).iter().enumerate().filter(|(_, batch)| !batch.is_empty()) {
+    pub fn add(&self, deposits: &[Option<(LeafCell, Deposit)>], places: &mut [Option<CellIndex>]) {
+        let keys = deposits.iter().zip(0..).filter_map(|(deposit, at)| deposit.map(|(cell, _)| (cell.key(), at)));
+        ByShard::new(keys.collect()).for_each(|shard, batch| {
             let mut table = self.lock(shard);
-            for &at in batch {
-                let (Some(key), deposit) = &deposits[at as usize] else { continue };
-                let number = table.cell(*key);
+            for &(key, at) in batch {
+                let Some((_, deposit)) = &deposits[at as usize] else { continue };
+                let number = table.cell(key);
                 table.add(number, deposit);
                 places[at as usize] = Some(place(shard, number));
             }
-        }
+        });
     }
 
-    fn lock(&self, shard: usize) -> std::sync::MutexGuard<'_, Table> {
+    fn lock(&self, shard: usize) -> std::sync::MutexGuard<'_, Table<CellKey>> {
         self.shards[shard].lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
@@ -185,22 +239,21 @@ impl ShardedTable {
     ///
     /// # Panics
     /// If a shard comes to hold 2²⁶ cells, 4 GiB.
-    pub fn merge(&self, local: &Table, indices: &mut Vec<CellIndex>) {
+    pub fn merge(&self, local: &Table<LeafCell>, indices: &mut Vec<CellIndex>) {
         indices.clear();
         indices.resize(local.cells.len(), 0);
-        let shards = local.cells.iter().map(|cell| Some(shard_of(cell.key)));
-        for (shard, batch) in by_shard(shards).iter().enumerate().filter(|(_, batch)| !batch.is_empty()) {
+        let keys = local.cells.iter().zip(0..).map(|(cell, at)| (cell.key.key(), at));
+        ByShard::new(keys.collect()).for_each(|shard, batch| {
             let mut table = self.lock(shard);
-            for &cell in batch {
-                let Cell { key, sums } = &local.cells[cell as usize];
-                let number = table.cell(*key);
-                table.merge(number, sums);
-                if let Some(wide) = local.wide.get(&cell) {
+            for &(key, at) in batch {
+                let number = table.cell(key);
+                table.merge(number, &local.cells[at as usize].sums);
+                if let Some(wide) = local.wide.get(&at) {
                     table.merge_wide(number, wide);
                 }
-                indices[cell as usize] = place(shard, number);
+                indices[at as usize] = place(shard, number);
             }
-        }
+        });
     }
 
     /// All cells with their sums and places, by shard.
@@ -226,7 +279,7 @@ impl ShardedTable {
         self.tables().map(|table| table.bytes()).sum()
     }
 
-    fn tables(&mut self) -> impl Iterator<Item = &mut Table> {
+    fn tables(&mut self) -> impl Iterator<Item = &mut Table<CellKey>> {
         self.shards.iter_mut().map(|shard| shard.get_mut().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 }
