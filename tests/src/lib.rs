@@ -6,3 +6,5 @@ pub mod error;
 pub mod image;
 pub mod render;
 pub mod shared;
+pub mod small;
+pub mod synthetic;
