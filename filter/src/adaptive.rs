@@ -4,9 +4,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::grid::{Anchor, Grid, LeafCell, Place};
-use crate::pairs::{Lobe as PairLobe, Pairs};
+use crate::pairs::{Lobe as PairLobe, Pair, Pairs};
 use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shrink::{Shrinkage, estimate};
+use crate::snapshot::{Snapshot, SnapshotError};
 use crate::sums::{Deposit, LUMINANCE, Quantum};
 use crate::table::{CellIndex, PerCell, ShardedTable, Table};
 
@@ -23,6 +24,9 @@ pub struct Params {
     pub second_leaf: f32,
     /// When differences between cells are believed.
     pub shrinkage: Shrinkage,
+    /// Samples of a slot over which second vertices share; 0: all. Sums of filters that saw different epochs add up to those
+    /// of one that saw all; within an epoch each block profits from those before it.
+    pub epoch: u64,
     /// Radiance of the order of the frame's mean: see [`Quantum`].
     pub unit: f32,
 }
@@ -32,9 +36,10 @@ impl Default for Params {
         Self {
             trees: 4,
             second_trees: 1,
-            leaf: 2.0,
+            leaf: 3.0,
             second_leaf: 8.0,
-            shrinkage: Shrinkage { tau: 2.5, trusted: 24.0, levels: 5 },
+            shrinkage: Shrinkage { tau: 2.5, trusted: 24.0, levels: 4 },
+            epoch: 0,
             unit: 1.0,
         }
     }
@@ -60,7 +65,7 @@ pub struct Report {
     pub unfiltered: u64,
     /// Cells of all trees at the first vertex.
     pub cells: u64,
-    /// Cells of all trees at the second vertex, in the last block.
+    /// Cells of all trees at the second vertex, in the last epoch.
     pub second_cells: u64,
     /// Pairs of slot and cell.
     pub pairs: u64,
@@ -98,6 +103,8 @@ pub struct Adaptive {
     second: Vec<Tree>,
     /// By part.
     pairs: Vec<Pairs>,
+    /// Number of the current epoch, once there is one.
+    epoch: Option<u64>,
     report: Report,
 }
 
@@ -111,14 +118,18 @@ impl Adaptive {
             glossy: Tree::several(anchor, params.trees),
             second: Tree::several(anchor, params.second_trees),
             pairs: (0..parts).map(|_| Pairs::default()).collect(),
+            epoch: None,
             report: Report::default(),
         }
     }
 
-    /// Forgets what second vertices shared: those of the blocks to come share among themselves. What sets of blocks share
-    /// decides the result, so a frame that is rendered in ranges must be cut where the ranges are.
-    pub fn begin_epoch(&mut self) {
-        self.second.iter_mut().for_each(|tree| tree.cells.clear());
+    /// Says which samples of the slots the next block holds, by the first of them. Second vertices share within epochs of
+    /// [`Params::epoch`] samples.
+    pub fn begin_block(&mut self, first_sample: u64) {
+        let epoch = first_sample.checked_div(self.params.epoch).unwrap_or(0);
+        if self.epoch.replace(epoch).is_some_and(|last| last != epoch) {
+            self.second.iter_mut().for_each(|tree| tree.cells.clear());
+        }
     }
 
     /// Adds a block of paths, by part. A slot belongs to one part for good.
@@ -177,6 +188,52 @@ impl Adaptive {
             .collect();
         self.report.second_cells = self.second.iter_mut().map(|tree| tree.cells.len() as u64).sum();
         suffixes
+    }
+
+    /// All sums so far, the same whoever met which cell first.
+    pub fn snapshot(&mut self) -> Snapshot {
+        let mut snapshot = Snapshot { paths: [self.report.paths, self.report.unfiltered], ..Snapshot::default() };
+        let mut numbers = Vec::new();
+        for tree in self.diffuse.iter_mut().chain(&mut self.glossy) {
+            let mut cells: Vec<_> = tree.cells.cells().collect();
+            cells.sort_unstable_by_key(|(_, key, _)| *key);
+            let mut number = PerCell::new(&mut tree.cells);
+            cells.iter().zip(0u32..).for_each(|((place, ..), at)| number.set(*place, at));
+            snapshot.trees.push(cells.into_iter().map(|(_, key, sums)| (key, sums)).collect());
+            numbers.push(number);
+        }
+        for pairs in &mut self.pairs {
+            let (pairs, own) = pairs.parts();
+            let mut pairs: Vec<Pair> = pairs
+                .iter()
+                .map(|pair| pair.with_cell(numbers[pair.tree_of(numbers.len())].get(pair.index() as u32)))
+                .collect();
+            pairs.sort_unstable_by_key(Pair::order);
+            snapshot.pairs.push(pairs);
+            snapshot.own.push(own.to_vec());
+        }
+        snapshot
+    }
+
+    /// Adds the sums of another filter over the same frame. Exact: the order of additions does not count.
+    ///
+    /// # Errors
+    /// The other has other trees or parts; then nothing was added.
+    pub fn absorb(&mut self, other: &Snapshot) -> Result<(), SnapshotError> {
+        let trees = self.diffuse.len() + self.glossy.len();
+        if other.trees.len() != trees || other.pairs.len() != self.pairs.len() || other.own.len() != self.pairs.len() {
+            return Err(SnapshotError::Mismatch);
+        }
+        let mut places: Vec<Vec<CellIndex>> = Vec::with_capacity(trees);
+        for (tree, cells) in self.diffuse.iter_mut().chain(&mut self.glossy).zip(&other.trees) {
+            places.push(cells.iter().map(|(key, sums)| tree.cells.add_sums(*key, sums)).collect());
+        }
+        for ((mine, pairs), own) in self.pairs.iter_mut().zip(&other.pairs).zip(&other.own) {
+            mine.absorb(pairs.iter().map(|pair| pair.with_cell(places[pair.tree_of(trees)][pair.index()])), own);
+        }
+        self.report.paths += other.paths[0];
+        self.report.unfiltered += other.paths[1];
+        Ok(())
     }
 
     /// What each slot of each part gets from all paths so far; slots without a path are left out.
@@ -318,3 +375,7 @@ fn deposit_in_all(
     }
     found
 }
+
+#[cfg(test)]
+#[path = "adaptive_tests.rs"]
+mod tests;

@@ -56,9 +56,13 @@ impl CellKey {
         mix64(self.0 as u64 ^ mix64((self.0 >> 64) as u64))
     }
 
+    /// From [`Self::bits`].
+    pub fn from_bits(bits: u128) -> Self {
+        Self(bits)
+    }
+
     /// All bits.
-    #[cfg(test)]
-    fn bits(self) -> u128 {
+    pub fn bits(self) -> u128 {
         self.0
     }
 }

@@ -19,7 +19,7 @@ pub(crate) enum Lobe {
 ///
 /// Throughputs are whole multiples of 2⁻²⁰, so sums are exact in any order; a sum that would overflow begins another pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Pair {
+pub(crate) struct Pair {
     /// Slot, and below it the lobe and the tree: [`Pair::label`].
     slot_lobe_tree: u32,
     cell: CellIndex,
@@ -46,8 +46,35 @@ impl Pair {
         self.slot_lobe_tree & ((1 << TREE_BITS) - 1)
     }
 
-    fn order(&self) -> u64 {
+    pub fn order(&self) -> u64 {
         u64::from(self.slot_lobe_tree) << 32 | u64::from(self.cell)
+    }
+
+    /// Which of `trees` trees it reads, diffuse and then glossy.
+    pub fn tree_of(&self, trees: usize) -> usize {
+        self.tree() as usize + if self.lobe() == Lobe::Glossy { trees / 2 } else { 0 }
+    }
+
+    /// Its cell, where that is an index.
+    pub fn index(&self) -> usize {
+        self.cell as usize
+    }
+
+    /// The same pair with another number for its cell.
+    pub fn with_cell(self, cell: u32) -> Self {
+        Self { cell, ..self }
+    }
+
+    /// As words, to be stored.
+    pub fn to_words(self) -> [u64; 3] {
+        let [r, g, b] = self.throughput.map(|x| u64::from(x as u32));
+        [u64::from(self.slot_lobe_tree) | u64::from(self.cell) << 32, r | g << 32, b]
+    }
+
+    /// From [`Self::to_words`].
+    pub fn from_words([labels, rg, b]: [u64; 3]) -> Self {
+        let throughput = [rg as i32, (rg >> 32) as i32, b as i32];
+        Self { slot_lobe_tree: labels as u32, cell: (labels >> 32) as u32, throughput }
     }
 
     /// Adds another pair's throughput, if it fits.
@@ -61,9 +88,28 @@ impl Pair {
 
 /// Sums of one slot that need no cell, in quanta: of 2⁻²⁴ units, up to 2³⁹ of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Own {
+pub(crate) struct Own {
     glossy: [[i64; 3]; 2],
     unfiltered: [[i64; 3]; 2],
+}
+
+impl Own {
+    /// As words, to be stored.
+    pub fn to_words(self) -> [i64; 12] {
+        let lists = [self.glossy[0], self.glossy[1], self.unfiltered[0], self.unfiltered[1]];
+        std::array::from_fn(|i| lists[i / 3][i % 3])
+    }
+
+    /// From [`Self::to_words`].
+    pub fn from_words(words: [i64; 12]) -> Self {
+        let list = |at: usize| [words[at], words[at + 1], words[at + 2]];
+        Self { glossy: [list(0), list(3)], unfiltered: [list(6), list(9)] }
+    }
+
+    fn absorb(&mut self, other: &Self) {
+        let (mine, others) = (self.to_words(), other.to_words());
+        *self = Self::from_words(std::array::from_fn(|i| mine[i].saturating_add(others[i])));
+    }
 }
 
 /// All pairs of one part.
@@ -141,6 +187,22 @@ impl Pairs {
         self.block = self.pairs.len();
     }
 
+    /// All pairs and own sums, of blocks that have ended.
+    pub fn parts(&mut self) -> (&[Pair], &[(u32, Own)]) {
+        self.compact();
+        self.block = self.pairs.len();
+        (&self.pairs, &self.own)
+    }
+
+    /// Adds others', whose cells have the numbers of the large tables.
+    pub fn absorb(&mut self, pairs: impl Iterator<Item = Pair>, own: &[(u32, Own)]) {
+        self.pairs.extend(pairs);
+        self.end_block();
+        for (slot, sums) in own {
+            self.own(*slot).absorb(sums);
+        }
+    }
+
     fn compact(&mut self) {
         self.pairs.sort_unstable_by_key(Pair::order);
         self.pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
@@ -169,14 +231,18 @@ impl Pairs {
         // met them first, does not count.
         let scale = 2f64.powi(RESOLVED_BITS);
         let mut sums: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
-        for pair in &self.pairs {
+        // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
+        // where the overflow came does not count either.
+        for same in self.pairs.chunk_by(|a, b| a.order() == b.order()) {
+            let pair = &same[0];
+            let throughput: [i64; 3] = std::array::from_fn(|c| same.iter().map(|p| i64::from(p.throughput[c])).sum());
             if sums.last().is_none_or(|(slot, _)| *slot != pair.slot()) {
                 sums.push((pair.slot(), Default::default()));
             }
             let Some((_, lobes)) = sums.last_mut() else { continue };
             let estimate = read(pair.lobe(), pair.tree() as usize, pair.cell);
-            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(pair.throughput).zip(estimate) {
-                *sum += (f64::from(throughput) * f64::from(x) / quantum.radiance() * scale) as i128;
+            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(estimate) {
+                *sum += (throughput as f64 * f64::from(x) / quantum.radiance() * scale) as i128;
             }
         }
         let radiance = |sum: [i128; 3]| {

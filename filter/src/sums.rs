@@ -158,6 +158,15 @@ impl WideSums {
     }
 }
 
+impl TryFrom<&WideSums> for Sums {
+    type Error = std::num::TryFromIntError;
+
+    fn try_from(wide: &WideSums) -> Result<Self, Self::Error> {
+        let [r, g, b] = wide.rgb.map(u64::try_from);
+        Ok(Self { count: wide.count, weight: wide.weight, rgb: [r?, g?, b?], square: wide.square.try_into()? })
+    }
+}
+
 impl From<&Sums> for WideSums {
     fn from(sums: &Sums) -> Self {
         let Sums { count, weight, rgb, square } = *sums;

@@ -256,6 +256,18 @@ impl ShardedTable {
         });
     }
 
+    /// Adds sums to the cell of `key`; its place.
+    pub fn add_sums(&mut self, key: CellKey, sums: &WideSums) -> CellIndex {
+        let shard = shard_of(key);
+        let mut table = self.lock(shard);
+        let number = table.cell(key);
+        match Sums::try_from(sums) {
+            Ok(sums) => table.merge(number, &sums),
+            Err(_) => table.merge_wide(number, sums),
+        }
+        place(shard, number)
+    }
+
     /// All cells with their sums and places, by shard.
     pub fn cells(&mut self) -> impl Iterator<Item = (CellIndex, CellKey, WideSums)> + '_ {
         self.shards.iter_mut().zip(0u32..).flat_map(|(shard, at)| {
