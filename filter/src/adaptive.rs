@@ -128,8 +128,13 @@ impl Adaptive {
     pub fn begin_block(&mut self, first_sample: u64) {
         let epoch = first_sample.checked_div(self.params.epoch).unwrap_or(0);
         if self.epoch.replace(epoch).is_some_and(|last| last != epoch) {
-            self.second.iter_mut().for_each(|tree| tree.cells.clear());
+            self.begin_epoch();
         }
+    }
+
+    /// Forgets what second vertices shared: those of the blocks to come share among themselves.
+    pub fn begin_epoch(&mut self) {
+        self.second.iter_mut().for_each(|tree| tree.cells.clear());
     }
 
     /// Adds a block of paths, by part. A slot belongs to one part for good.

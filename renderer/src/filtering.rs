@@ -110,11 +110,14 @@ impl FrameFilter {
         })
     }
 
-    /// Adds a block of paths, by tile.
-    pub fn add(&mut self, records: &[Vec<PathRecord>]) {
+    /// Adds the paths of a block, by tile.
+    pub fn add(&mut self, block: &Range<u64>, records: &[Vec<PathRecord>]) {
         match &mut self.sharing {
             Sharing::Talk(talk, _) => talk.add(records),
-            Sharing::Adaptive(adaptive, _) => adaptive.add(records),
+            Sharing::Adaptive(adaptive, _) => {
+                adaptive.begin_block(block.start);
+                adaptive.add(records);
+            }
         }
     }
 

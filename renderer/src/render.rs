@@ -314,7 +314,7 @@ fn trace_queries<Q: Queries + Sync>(
             for pass in filter.blocks(&asked) {
                 let (counters, paths) = passes.trace(&pass, || Paths::new(selection));
                 let start = Instant::now();
-                filter.add(&paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
+                filter.add(&pass, &paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
                 filtering += start.elapsed();
                 if done(&pass, counters) {
                     break;

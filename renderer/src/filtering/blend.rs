@@ -6,6 +6,8 @@
 //! the filter: with b' = max(0, b − c s), the result is F + w (U − F), w = b' / (b' + V), which minimises the error of the sum
 //! of independent estimates. As samples grow V vanishes, and w goes to 1 wherever F is wrong.
 //!
+//! With one sample a pixel there are no halves; then the neighbouring pixel stands for the other half.
+//!
 //! **Source**: the combiner of James and Stein \[James61\], \[Zheng22\] in its form for two halves, which is 1 − V/D with
 //! D = b + V; the standard error is ours, against the heavy tails of path tracing.
 
@@ -89,35 +91,59 @@ impl Frame {
             (luminance(pixel.base + pixel.glossy).powi(2) + 0.01 * mean * mean).max(f32::MIN_POSITIVE).recip()
         };
         let glossy = weights(&self.pixels, self.width, settings.glossy_doubt, settings.radius, |pixel| {
-            pixel.own_noise.map(|_| (pixel.glossy_noise, pixel.glossy_own - pixel.glossy, scale(pixel)))
+            let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
+            Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(pixel) }
         });
         let filtered: Vec<Vec3> = (self.pixels.iter().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
         let indexed: Vec<(Pixel, Vec3)> = self.pixels.iter().copied().zip(filtered.iter().copied()).collect();
-        let whole = weights(&indexed, self.width, settings.doubt, settings.radius, |(pixel, filtered)| {
-            pixel.own_noise.map(|noise| (noise, pixel.own - *filtered, scale(pixel)))
+        let whole = weights(&indexed, self.width, settings.doubt, settings.radius, |(pixel, filtered)| Difference {
+            from_filtered: pixel.own - *filtered,
+            noise: pixel.own_noise,
+            scale: scale(pixel),
         });
         indexed.iter().zip(whole).map(|((pixel, filtered), w)| *filtered + w * (pixel.own - *filtered)).collect()
     }
 }
 
-/// The unfiltered value's share for each pixel. `measure` tells a pixel's noise, its difference and their scale; `None`
-/// where noise is not known, which leaves the filter alone.
-fn weights<T>(
-    pixels: &[T],
-    width: usize,
-    doubt: f32,
-    radius: usize,
-    measure: impl Fn(&T) -> Option<(Vec3, Vec3, f32)>,
-) -> Vec<f32> {
-    let measured: Vec<[f32; 4]> = pixels
-        .iter()
-        .map(|pixel| {
-            let Some((noise, difference, scale)) = measure(pixel) else { return [0.0, 0.0, 0.0, 1.0] };
+/// How a pixel's unfiltered value differs from the filtered one.
+#[derive(Clone, Copy)]
+struct Difference {
+    from_filtered: Vec3,
+    /// Half the difference between the unfiltered values of even and odd samples; `None` without both.
+    noise: Option<Vec3>,
+    /// What squares are multiplied by, so that bright pixels do not count for more than dark ones.
+    scale: f32,
+}
+
+impl Difference {
+    /// Unbiased estimates of the squared error of the filtered value and of that of the unfiltered one.
+    fn errors(&self, neighbour: &Self) -> [f32; 2] {
+        let square = self.from_filtered.length_squared() * self.scale;
+        match self.noise {
             // (F − A)(F − B) with A and B at U ± noise.
-            let variance = noise.length_squared() * scale;
-            let error = difference.length_squared() * scale - variance;
+            Some(noise) => {
+                let variance = noise.length_squared() * self.scale;
+                [square - variance, variance]
+            }
+            // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
+            None => {
+                let both = (self.scale * neighbour.scale).sqrt();
+                let error = self.from_filtered.dot(neighbour.from_filtered) * both;
+                [error, (square - error).max(0.0)]
+            }
+        }
+    }
+}
+
+/// The unfiltered value's share for each pixel.
+fn weights<T>(pixels: &[T], width: usize, doubt: f32, radius: usize, measure: impl Fn(&T) -> Difference) -> Vec<f32> {
+    let differences: Vec<Difference> = pixels.iter().map(measure).collect();
+    let measured: Vec<[f32; 4]> = (0..differences.len())
+        .map(|i| {
+            let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
+            let [error, variance] = differences[i].errors(&differences[neighbour]);
             [error, error * error, variance, 1.0]
         })
         .collect();

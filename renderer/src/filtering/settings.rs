@@ -108,6 +108,7 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("second_trees", params.second_trees: u32, 1, 8),
     positive!("leaf", params.leaf: f32),
     positive!("second_leaf", params.second_leaf: f32),
+    number!("epoch", params.epoch: u64, 0, 1000000000),
     number!("tau", params.shrinkage.tau: f64, 0, 1000),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
     number!("levels", params.shrinkage.levels: u32, 0, 16),
