@@ -3,13 +3,14 @@
 //! `bench_filter SCENE.pbrt WIDTHxHEIGHT SPP[,SPP...] REFERENCES-A REFERENCES-B [KEY=VALUE ...]`
 //!
 //! References are EXR files of the scene, comma-separated: the mean of each list is one of two independent halves. Keys:
-//! - `methods`: comma-separated of `none`, `talk`, `adaptive`, and `NAME:FOLDER` for images that others made, files
-//!   `FOLDER/SCENE-SPP.exr`; of those that are absent nothing is printed. All but `NAME:FOLDER` unless told.
+//! - `methods`: comma-separated of `none`, `talk`, `adaptive`, and `NAME:FOLDER` for images that are there already, files
+//!   `FOLDER/SCENE-SPP.exr` with the seconds that each took in `FOLDER/SCENE-SPP.seconds`; for those that are absent
+//!   nothing is printed. Gains are over the first. `none,talk,adaptive` unless told;
 //! - `seed`;
-//! - `out`: a folder for the images, `SCENE-SPP-METHOD.exr`, with what denoisers want besides;
+//! - `out`: a folder for images and seconds, in such folders `METHOD`; the images with what denoisers want besides;
 //! - settings of the filters, as `tessera render --filter-set` has them; each goes to the filters that have it.
 //!
-//! Gains are over `none`, which comes first. Never a test: it only prints.
+//! Never a test: it only prints.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout)]
 
@@ -132,21 +133,21 @@ impl Bench {
     fn run(&self, spp: u64) -> Result<(), Failure> {
         let mut base = None;
         for method in &self.settings.methods {
-            let (image, statistics) = match method {
+            let (image, seconds, statistics) = match method {
                 Method::Ours(filtering) => {
                     let frame = self.render(spp, *filtering)?;
-                    (pixels(&frame), Some(frame.statistics))
+                    (pixels(&frame), Some(frame.statistics.render_seconds), Some(frame.statistics))
                 }
                 Method::Others { folder, .. } => {
                     let file = folder.join(format!("{}-{spp}.exr", self.name));
                     if !file.is_file() {
                         continue;
                     }
-                    (read_exr(&file).pixels, None)
+                    let seconds = std::fs::read_to_string(file.with_extension("seconds"));
+                    (read_exr(&file).pixels, seconds.ok().and_then(|text| text.trim().parse().ok()), None)
                 }
             };
             let errors = Errors::new(&image, &self.a, &self.b);
-            let seconds = statistics.as_ref().map(|statistics| statistics.render_seconds);
             let figures = Figures {
                 relmse: errors.relmse(0.999),
                 untrimmed: errors.relmse(1.0),
@@ -169,8 +170,11 @@ impl Bench {
             AovSet { albedo: self.settings.out.is_some(), normal: self.settings.out.is_some(), ..AovSet::default() };
         let frame = render::render(&Job { spp: Some(spp), filtering, aovs, ..self.job.clone() }, &Unobserved)?;
         if let Some(folder) = &self.settings.out {
-            let file = folder.join(format!("{}-{spp}-{}.exr", self.name, filtering.name()));
+            let folder = folder.join(filtering.name());
+            std::fs::create_dir_all(&folder)?;
+            let file = folder.join(format!("{}-{spp}.exr", self.name));
             exr::write(&frame.film, Vec::new(), &file)?;
+            std::fs::write(file.with_extension("seconds"), frame.statistics.render_seconds.to_string())?;
         }
         Ok(frame)
     }
@@ -199,13 +203,13 @@ impl Figures {
             ("blocks".into(), json!(base.blocks.len())),
         ]);
         if let (Some(own), Some(base)) = (self.seconds, base.seconds) {
+            line.insert("seconds".into(), json!(own));
             line.insert("gain_equal_time".into(), json!(gain * base / own));
         }
     }
 }
 
 fn costs(statistics: &Statistics, line: &mut Map<String, Value>) {
-    line.insert("seconds".into(), json!(statistics.render_seconds));
     line.insert("filter_seconds".into(), json!(statistics.filter_seconds));
     let figures = match &statistics.filter {
         None => json!({}),
