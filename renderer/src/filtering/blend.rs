@@ -121,18 +121,16 @@ impl Difference {
     /// Unbiased estimates of the squared error of the filtered value and of that of the unfiltered one.
     fn errors(&self, neighbour: &Self) -> [f32; 2] {
         let square = self.from_filtered.length_squared() * self.scale;
+        let both = (self.scale * neighbour.scale).sqrt();
+        let beside = self.from_filtered.dot(neighbour.from_filtered) * both;
         match self.noise {
             // (F − A)(F − B) with A and B at U ± noise.
             Some(noise) => {
                 let variance = noise.length_squared() * self.scale;
-                [square - variance, variance]
+                [0.5 * (square - variance + beside), variance]
             }
             // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
-            None => {
-                let both = (self.scale * neighbour.scale).sqrt();
-                let error = self.from_filtered.dot(neighbour.from_filtered) * both;
-                [error, (square - error).max(0.0)]
-            }
+            None => [beside, (square - beside).max(0.0)],
         }
     }
 }
