@@ -85,11 +85,11 @@ impl Pixel {
 impl Frame {
     /// The blended image.
     pub fn blend(&self, settings: &Blend) -> Vec<Rgb> {
-        let mean = self.pixels.iter().map(|pixel| luminance(pixel.own)).sum::<f32>() / self.pixels.len().max(1) as f32;
+        let sum: f64 = self.pixels.iter().map(|pixel| f64::from(luminance(pixel.own))).sum();
+        let mean = (sum / self.pixels.len().max(1) as f64) as f32;
         // Errors count relative to brightness, as eyes see them, down to a tenth of the mean.
-        let scale = |pixel: &Pixel| {
-            (luminance(pixel.base + pixel.glossy).powi(2) + 0.01 * mean * mean).max(f32::MIN_POSITIVE).recip()
-        };
+        let scale =
+            |pixel: &Pixel| luminance(pixel.base + pixel.glossy).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
         let glossy = weights(&self.pixels, self.width, settings.glossy_doubt, settings.radius, |pixel| {
             let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
             Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(pixel) }
@@ -113,20 +113,21 @@ struct Difference {
     from_filtered: Vec3,
     /// Half the difference between the unfiltered values of even and odd samples; `None` without both.
     noise: Option<Vec3>,
-    /// What squares are multiplied by, so that bright pixels do not count for more than dark ones.
+    /// What differences are multiplied by before they are squared, so that bright pixels do not count for more than dark
+    /// ones, and so that squares fit: those of radiance itself need not.
     scale: f32,
 }
 
 impl Difference {
     /// Unbiased estimates of the squared error of the filtered value and of that of the unfiltered one.
     fn errors(&self, neighbour: &Self) -> [f32; 2] {
-        let square = self.from_filtered.length_squared() * self.scale;
-        let both = (self.scale * neighbour.scale).sqrt();
-        let beside = self.from_filtered.dot(neighbour.from_filtered) * both;
+        let difference = self.from_filtered * self.scale;
+        let square = difference.length_squared();
+        let beside = difference.dot(neighbour.from_filtered * neighbour.scale);
         match self.noise {
             // (F − A)(F − B) with A and B at U ± noise.
             Some(noise) => {
-                let variance = noise.length_squared() * self.scale;
+                let variance = (noise * self.scale).length_squared();
                 [0.5 * (square - variance + beside), variance]
             }
             // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
