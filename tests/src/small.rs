@@ -1,5 +1,7 @@
 //! Small scenes written by tests, and what is measured on them.
 
+use std::path::PathBuf;
+
 use renderer::filtering::{Blend, Filtering};
 use renderer::render::{Frame, Job};
 
@@ -25,9 +27,14 @@ impl SceneFile {
         Self { folder }
     }
 
+    /// Where the file is.
+    pub fn path(&self) -> PathBuf {
+        self.folder.path().join("scene.pbrt")
+    }
+
     /// Renders the scene; the job's own scene does not count.
     pub fn render(&self, job: Job) -> Frame {
-        run(&Job { scene: self.folder.path().join("scene.pbrt"), ..job })
+        run(&Job { scene: self.path(), ..job })
     }
 
     /// Renders the scene with `spp` samples of `seed`, filtered or not.

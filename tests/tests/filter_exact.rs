@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use filter::{Adaptive, Anchor, Lobe, PackedRgb, Params, PathRecord, Resolved, Shrinkage, Vertex};
+use filter::{Adaptive, Anchor, Lobe, PackedRgb, Params, PathRecord, Resolved, Shrinkage, Snapshot, Vertex};
 use glam::{DVec3, Vec3};
 use tests::synthetic::{ANCHOR, Random, Sheet, diffuse, resolve, thorough};
 
@@ -266,6 +266,35 @@ fn epochs_add_to_the_same_bits_in_any_order() {
     }
     assert!(all_bits(filter.resolve()) == expected, "resolving in between changes the end");
     println!("5 epochs in 4 orders, and resolved in between: same bits");
+}
+
+#[test]
+fn parts_of_a_frame_add_to_the_same_bits_in_any_order() {
+    // As machines of a farm would: each filters some of the epochs, and their sums are stored, read and added.
+    let blocks: Vec<Vec<PathRecord>> = (0..6).map(|block| motley(2000, 64, 1.0, 80 + block)).collect();
+    let filter = |epochs: &[usize]| {
+        let mut filter = Adaptive::new(&Params::default(), &ANCHOR, 1);
+        for &at in epochs {
+            filter.begin_epoch();
+            filter.add(std::slice::from_ref(&blocks[at]));
+        }
+        filter
+    };
+    let mut whole = filter(&[0, 1, 2, 3, 4, 5]);
+    let stored = whole.snapshot().to_bytes();
+    let expected = all_bits(whole.resolve());
+    for shares in
+        [vec![vec![0, 1, 2, 3, 4, 5]], vec![vec![3, 4, 5], vec![0, 1, 2]], vec![vec![5, 0], vec![2], vec![4, 1, 3]]]
+    {
+        let mut sum = Adaptive::new(&Params::default(), &ANCHOR, 1);
+        for share in &shares {
+            let bytes = filter(share).snapshot().to_bytes();
+            sum.absorb(&Snapshot::from_bytes(&bytes).expect("what was stored")).expect("the same frame");
+        }
+        assert!(sum.snapshot().to_bytes() == stored, "{shares:?}: other sums are stored");
+        assert!(all_bits(sum.resolve()) == expected, "{shares:?} differs");
+    }
+    println!("6 epochs over 1, 2 and 3 filters, stored ({} bytes), read and added: same bits", stored.len());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use filter::{Anchor, Params, PathRecord, Shrinkage, Vertex};
 use glam::{Affine3A, DVec3, Quat, Vec2, Vec3};
-use tests::synthetic::{ANCHOR, Random, Sheet, diffuse, mean, means, rms, unfiltered};
+use tests::synthetic::{ANCHOR, Random, Sheet, diffuse, mean, means, rms, thorough, unfiltered};
 
 /// Sides of the finest cells of each tree where footprints are 1.
 fn leaves(params: &Params) -> Vec<f32> {
@@ -148,7 +148,7 @@ fn edge_bound(flat: f64) -> f64 {
 
 #[test]
 fn blunt_edges_leak_no_more_than_edges_of_shadows() {
-    for spp in [16, 64, 256] {
+    for spp in if thorough() { vec![16, 64, 256] } else { vec![16, 64] } {
         let (flat, flat_reach) = edge_leak(0.0, 0.0, spp);
         for fold in [15.0, 30.0, 60.0] {
             let leaks: Vec<(f64, usize)> =
@@ -498,7 +498,7 @@ fn shrinkage_falls_away_as_samples_grow() {
     let field = |at: Vec2| 1.0 + 0.5 * (at.x * 0.35).sin() * (at.y * 0.35).sin();
     let mut last = f64::INFINITY;
     for spp in [4, 16, 64, 256] {
-        let seeds = if spp > 64 { 8 } else { 16 };
+        let seeds = if thorough() { 32 } else { u64::from(256 / spp).clamp(6, 16) };
         let (mut sums, mut single) = ([vec![0.0; 2304], vec![0.0; 2304]], 0.0);
         let slot_mean = |i: usize| {
             let at = |d: f32| field(Vec2::new((i % 48) as f32 + d, (i / 48) as f32 + d));
