@@ -105,7 +105,8 @@ impl Grid {
         // Above the largest cells, so that every level's borders are shifted at random; a power of two, so that a scene
         // scaled by one keeps its cells.
         let reach = 2f64.powi(exponent_of(anchor.extent) - 2);
-        let random = |axis: u64| (mix64(u64::from(index) << 2 | axis) >> 11) as f64 / (1u64 << 53) as f64;
+        // From 1 on, for 0 is mixed to 0: a border through the camera, on which walls like to lie.
+        let random = |axis: u64| (mix64((u64::from(index) << 2 | axis) + 1) >> 11) as f64 / (1u64 << 53) as f64;
         let shift = DVec3::new(random(0), random(1), random(2)) * reach;
         let scale = 2f64.powf(f64::from(index) / f64::from(count));
         let finest = exponent_of(anchor.extent) + 3 - COORDINATE_BITS as i32;
@@ -270,6 +271,15 @@ mod tests {
                 // With room to spare: a bumpy wall is still one wall.
                 assert!(normals.iter().all(|n| key(*n) == key((*n + 0.2 * n.any_orthonormal_vector()).normalize())));
             }
+        }
+    }
+
+    #[test]
+    fn no_border_passes_through_the_camera_or_at_a_round_distance_from_it() {
+        for grid in (0..8).map(|index| Grid::new(&ANCHOR, index, 8)) {
+            let shift = (ANCHOR.origin - grid.corner).to_array();
+            // No multiple of a 64th, which a border of cells of that side would be.
+            assert!(shift.iter().all(|x| (x * 64.0).fract() > 1e-3 && (x * 64.0).fract() < 1.0 - 1e-3), "{shift:?}");
         }
     }
 
