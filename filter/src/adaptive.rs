@@ -36,8 +36,8 @@ impl Default for Params {
         Self {
             trees: 4,
             second_trees: 1,
-            leaf: 3.0,
-            second_leaf: 8.0,
+            leaf: 4.0,
+            second_leaf: 16.0,
             shrinkage: Shrinkage { tau: 2.5, trusted: 24.0, levels: 4 },
             epoch: 0,
             unit: 1.0,

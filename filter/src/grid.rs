@@ -47,7 +47,7 @@ impl CellKey {
         let morton = self.0 as u64;
         // An arithmetic shift of each coordinate: the three signs stay on top.
         let halved = morton >> 3 | morton & SIGNS;
-        Self((self.0 >> 64 << 64) + (1 << 112) | u128::from(halved))
+        Self(((self.0 >> 64 << 64) + (1 << 112)) | u128::from(halved))
     }
 
     /// Well mixed bits.

@@ -132,8 +132,7 @@ impl Pairs {
     #[must_use]
     pub fn add(&mut self, slot: u32, lobe: Lobe, tree: u32, cell: CellIndex, throughput: Vec3) -> bool {
         const SCALE: f32 = (1 << THROUGHPUT_BITS) as f32;
-        // Also false for NaN.
-        if !(throughput.abs().max_element() < (i32::MAX as f32) / SCALE) {
+        if !throughput.is_finite() || throughput.abs().max_element() >= (i32::MAX as f32) / SCALE {
             return false;
         }
         let throughput = (throughput * SCALE).to_array().map(|x| (x + 0.5f32.copysign(x)) as i32);

@@ -173,10 +173,17 @@ fn parents(nodes: &[Node]) -> Vec<Node> {
 
 /// Sets the estimates of all children of `parent`.
 fn shrink(siblings: &mut [Node], parent: &Node, shrinkage: &Shrinkage) {
-    let weight = kept(siblings, &parent.moments, shrinkage);
     let mean = parent.moments.mean();
+    // No further than to where the first channel of a child would become negative, which its parent's own shrinkage can
+    // bring about; the sum over siblings is still kept.
+    let reach = |child: &Node| {
+        let down = (mean - child.moments.mean()).max(DVec3::ZERO);
+        // Where nothing goes down the quotient is infinite or, 0 / 0, not a number, which `min` passes over.
+        (parent.estimate / down).to_array().into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let weight = siblings.iter().map(reach).fold(kept(siblings, &parent.moments, shrinkage), f64::min).max(0.0);
     for child in siblings {
-        child.estimate = parent.estimate + weight * (child.moments.mean() - mean);
+        child.estimate = (parent.estimate + weight * (child.moments.mean() - mean)).max(DVec3::ZERO);
     }
 }
 

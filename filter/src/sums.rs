@@ -47,8 +47,7 @@ impl Quantum {
             return None;
         }
         const QUANTA: f32 = (1 << WEIGHT_BITS) as f32;
-        // A weight that is not a number becomes the smallest.
-        let weight = (weight * QUANTA).max(1.0).min(LARGEST_WEIGHT * QUANTA).round();
+        let weight = if weight.is_nan() { 1.0 } else { (weight * QUANTA).clamp(1.0, LARGEST_WEIGHT * QUANTA).round() };
         let share = f64::from(weight / QUANTA);
         let radiance = radiance.as_dvec3();
         let luminance = radiance.dot(LUMINANCE);
