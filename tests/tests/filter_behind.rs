@@ -1,6 +1,8 @@
 //! Behind glass and in mirrors the filter works as in plain view, where one that is guided by what the camera sees first
 //! has nothing to go by.
 
+#![allow(clippy::print_stdout)]
+
 use std::path::Path;
 
 use renderer::film::{AovSet, Image};
