@@ -14,11 +14,11 @@ use crate::table::{CellIndex, PerCell, ShardedTable, Table};
 /// Settings. The defaults are measured, not derived.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Params {
-    /// Shifted trees at the first vertex: deposits go to all, each path reads one.
+    /// Shifted trees at the first vertex, at most 8: deposits go to all, each path reads one.
     pub trees: u32,
     /// Shifted trees at the second vertex: each path reads all.
     pub second_trees: u32,
-    /// Side of the finest cells at the first vertex, in footprints.
+    /// Finest cells at the first vertex are a quarter to one of this wide, in footprints.
     pub leaf: f32,
     /// The same at the second vertex.
     pub second_leaf: f32,
@@ -110,7 +110,12 @@ pub struct Adaptive {
 
 impl Adaptive {
     /// An empty filter over `parts` disjoint sets of slots.
+    ///
+    /// # Panics
+    /// If a number of trees is not from 1 to 8.
     pub fn new(params: &Params, anchor: &Anchor, parts: usize) -> Self {
+        let counts = [params.trees, params.second_trees];
+        assert!(counts.iter().all(|count| (1..=8).contains(count)), "trees: {counts:?}");
         Self {
             params: *params,
             quantum: Quantum::new(params.unit),

@@ -167,7 +167,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A vertex at `p` that faces `n`, whose finest cells are at least `side` / 2 and less than `side` wide before the
+    /// A vertex at `p` that faces `n`, whose finest cells are more than `side` / 4 and at most `side` / 2 wide before the
     /// tree's scale, unless that is less than 2⁻¹⁸ of the extent. `attributes`: 45 bits that vertices must agree in to meet.
     #[inline]
     pub fn new(p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Self {
