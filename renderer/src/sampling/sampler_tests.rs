@@ -17,15 +17,19 @@ fn uses_have_dimensions_of_their_own() {
 }
 
 #[test]
-fn aligned_blocks_are_nets() {
+fn aligned_blocks_of_even_and_of_odd_samples_are_nets() {
     // Block starts: the first, one in the middle, one beyond 2^16, one across the upper half of the index.
     for (case, dimension) in dimensions().into_iter().enumerate() {
         for log2 in 0..=10 {
             for start in [0, 5 << log2, (1 << 20) + (3 << log2), (7_u64 << 40) + (1 << log2)] {
-                let points: Vec<Vec2> = (start..start + (1 << log2))
-                    .map(|i| Sampler::new(case as u64).pixel_sample([17, 5 + case as u32], i).d2(dimension))
-                    .collect();
-                assert_is_net(&points, log2);
+                for half in [0, 1] {
+                    let points: Vec<Vec2> = (start..start + (1 << log2))
+                        .map(|i| {
+                            Sampler::new(case as u64).pixel_sample([17, 5 + case as u32], 2 * i + half).d2(dimension)
+                        })
+                        .collect();
+                    assert_is_net(&points, log2);
+                }
             }
         }
     }
@@ -170,11 +174,21 @@ fn the_error_of_a_smooth_integral_falls_much_faster_than_by_chance() {
 }
 
 #[test]
-fn samples_beyond_2_to_the_32_are_new() {
+fn samples_beyond_2_to_the_33_are_new() {
     let sampler = Sampler::new(3);
     let p = pair_p_value(unstratified_samples().map(|i| {
         let value = |i| sampler.pixel_sample([1, 1], i).d1(Dimension::FILM);
-        (value(i), value(i + (1 << 32)))
+        (value(i), value(i + (1 << 33)))
+    }));
+    assert!(p > REJECT, "p = {p}");
+}
+
+#[test]
+fn even_and_odd_samples_are_independent() {
+    let sampler = Sampler::new(5);
+    let p = pair_p_value(unstratified_samples().map(|i| {
+        let value = |i| sampler.pixel_sample([1, 1], i).d1(Dimension::FILM);
+        (value(2 * i), value(2 * i + 1))
     }));
     assert!(p > REJECT, "p = {p}");
 }
