@@ -192,13 +192,13 @@ fn facing(n: Vec3) -> u32 {
 
 /// ⌊log₂ x⌋ of a positive normal number.
 #[inline]
-fn exponent_of(x: f64) -> i32 {
+pub(crate) fn exponent_of(x: f64) -> i32 {
     (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
 }
 
 /// 2ᵉ for |e| < 1023.
 #[inline]
-fn power_of_two(e: i32) -> f64 {
+pub(crate) fn power_of_two(e: i32) -> f64 {
     f64::from_bits(((1023 + e) as u64) << 52)
 }
 

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::params::{Jitter, LevelOfDetail, Params};
 use super::random::Random;
-use crate::grid::Anchor;
+use crate::grid::{Anchor, exponent_of, power_of_two};
 use crate::hash::mix64;
 use crate::record::Vertex;
 
@@ -207,18 +207,6 @@ fn normal_bin(n: Vec3, bins: u32) -> u32 {
     let on_face = (others / major.abs() * 0.5 + 0.5) * bins as f32;
     let [u, v] = on_face.to_array().map(|x| (x as u32).min(bins - 1));
     (face * bins + u) * bins + v
-}
-
-/// ⌊log₂ x⌋ of a positive normal number.
-#[inline]
-fn exponent_of(x: f64) -> i32 {
-    (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
-}
-
-/// 2ᵉ for |e| < 1023.
-#[inline]
-fn power_of_two(e: i32) -> f64 {
-    f64::from_bits(((1023 + e) as u64) << 52)
 }
 
 #[cfg(test)]
