@@ -228,7 +228,9 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     statistics.parse_seconds = start.elapsed().as_secs_f64();
 
     let seed = job.seed.unwrap_or(description.seed);
-    let asked = job.sample_range.clone().unwrap_or(0..job.spp.unwrap_or(description.spp).max(1));
+    let spp = job.spp.unwrap_or(description.spp).max(1);
+    let asked = job.sample_range.clone().unwrap_or(0..spp);
+    let spp = spp.max(asked.end);
     if asked.is_empty() {
         return Err(RenderError::EmptySampleRange(asked));
     }
@@ -258,7 +260,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         camera_from_world: description.camera.world_from_camera.inverse().matrix(),
         ndc_from_world: world.camera.ndc_from_world(),
         filename: description.film.filename.clone(),
-        filtering: job.filtering,
+        filtering: job.filtering.settled(spp),
     };
     Ok(Prepared { world, description, aovs, statistics, device })
 }

@@ -108,7 +108,16 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("second_trees", params.second_trees: u32, 1, 8),
     positive!("leaf", params.leaf: f32),
     positive!("second_leaf", params.second_leaf: f32),
-    number!("epoch", params.epoch: u64, 0, 1000000000),
+    Setting {
+        key: "epoch",
+        values: "auto or 1 to 1000000000",
+        get: |all| if all.params.epoch == 0 { "auto".into() } else { all.params.epoch.to_string() },
+        set: |all, text| {
+            let samples = text.parse().ok().filter(|samples| (1..=1_000_000_000).contains(samples));
+            let value = if text == "auto" { Some(0) } else { samples };
+            value.map(|value| all.params.epoch = value).is_some()
+        },
+    },
     number!("tau", params.shrinkage.tau: f64, 0, 1000),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
     number!("levels", params.shrinkage.levels: u32, 0, 16),
@@ -416,6 +425,8 @@ mod tests {
             ("adaptive", "tau", "3.25", "-0.1"),
             ("adaptive", "radius", "0", "1.5"),
             ("adaptive", "leaf", "0.5", "0"),
+            ("adaptive", "epoch", "auto", "0"),
+            ("adaptive", "epoch", "12", "always"),
             ("talk", "vertex", "tertiary", "quaternary"),
             ("talk", "level", "distance", "far"),
             ("talk", "side", "0.125", "inf"),
