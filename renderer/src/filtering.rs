@@ -74,6 +74,8 @@ pub enum Report {
 /// A frame's filter.
 pub struct FrameFilter {
     sharing: Sharing,
+    /// Radiance that the cells' sums are too coarse for, see [`COARSE`].
+    coarse: f32,
     blocks: Blocks,
 }
 
@@ -117,7 +119,7 @@ impl FrameFilter {
                 Sharing::Adaptive(Box::new(Adaptive::new(&params, &anchor, film.tiles().len())), blend)
             }
         };
-        Ok(Some(Self { sharing, blocks: Blocks { length: block, epoch: filtering.epoch() } }))
+        Ok(Some(Self { sharing, coarse: unit * COARSE, blocks: Blocks { length: block, epoch: filtering.epoch() } }))
     }
 
     /// The vertex that paths are to be cut at.
@@ -166,7 +168,12 @@ impl FrameFilter {
                 let bounds = film.bounds();
                 let frame =
                     blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
-                film.set_filtered(&frame.blend(&blend));
+                let mut values = frame.blend(&blend);
+                let coarse = expose(Vec3::splat(self.coarse)).max_element();
+                for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(v, _)| v.max_element() < coarse) {
+                    *value = film.pixel(at).mean().as_vec3();
+                }
+                film.set_filtered(&values);
                 Report::Adaptive(adaptive.report())
             }
         }
@@ -193,6 +200,10 @@ impl Blocks {
         })
     }
 }
+
+/// Cells hold multiples of 2⁻³⁰ of the frame's unit, so below 2⁻²⁰ of it values are off by 2⁻¹¹ and more, and at last read as
+/// black: in the shade of a frame in which something is a million times as bright, pixels keep their own values.
+const COARSE: f32 = 1.0 / (1 << 20) as f32;
 
 /// What each pixel of a film got, by its index.
 fn by_slot<T: Clone + Default>(film: &Film, parts: Vec<Vec<(u32, T)>>) -> Vec<T> {

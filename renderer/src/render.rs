@@ -100,6 +100,18 @@ pub enum RenderError {
     /// Nothing to do.
     #[error("the sample range {}:{} is empty; the first number must be less than the second", .0.start, .0.end)]
     EmptySampleRange(Range<u64>),
+    /// The frame is larger than the machine.
+    #[error(
+        "a frame of {} x {} pixels takes {} GB, more than there is memory: render parts of it with --crop or \
+         --pixel-bounds, or with fewer auxiliary outputs",
+        size[0], size[1], bytes.div_ceil(1_000_000_000)
+    )]
+    Memory {
+        /// The part that is to be rendered, in pixels.
+        size: [u32; 2],
+        /// What its sums take.
+        bytes: u64,
+    },
     /// The filter does not take its settings.
     #[error(transparent)]
     Filter(#[from] SettingError),
@@ -200,6 +212,10 @@ pub struct Prepared {
 pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> {
     let pool = thread_pool(job.threads)?;
     let prepared = pool.install(|| prepare(job, observer))?;
+    let (bounds, aovs) = (prepared.world.sensor.bounds, prepared.aovs);
+    if !Film::fits_memory(bounds, aovs) {
+        return Err(RenderError::Memory { size: [bounds.width(), bounds.height()], bytes: Film::memory(bounds, aovs) });
+    }
     Ok(pool.install(|| trace(prepared, job.time_limit, observer)))
 }
 
@@ -243,22 +259,24 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     observer.phase(Phase::Compile);
     let start = Instant::now();
     let device = embree::Device::new(&embree::DeviceOptions::default())?;
-    let (world, warnings) = compile::world(&description, &device, job.techniques).map_err(|errors| match errors {
-        CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
-        CompileError::Embree(error) => RenderError::Embree(error),
-    })?;
+    let (world, warnings) =
+        compile::origin::world(&mut description, &device, job.techniques).map_err(|errors| match errors {
+            CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
+            CompileError::Embree(error) => RenderError::Embree(error),
+        })?;
     warnings.iter().for_each(|warning| observer.warning(warning));
     statistics.compile_seconds = start.elapsed().as_secs_f64();
     statistics.embree_bytes = device.memory().peak;
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
+    let ours_from_world = glam::DMat4::from_translation(-world.origin);
     let description = FrameDescription {
         seed,
         sample_range: asked.start..asked.start,
         sample_range_asked: asked,
         scene_hash: description.sources.hash(),
-        camera_from_world: description.camera.world_from_camera.inverse().matrix(),
-        ndc_from_world: world.camera.ndc_from_world(),
+        camera_from_world: description.camera.world_from_camera.inverse().matrix() * ours_from_world,
+        ndc_from_world: world.camera.ndc_from_world().map(|ndc_from_ours| ndc_from_ours * ours_from_world),
         filename: description.film.filename.clone(),
         filtering: job.filtering.settled(spp),
     };

@@ -1,6 +1,6 @@
 //! Everything that paths are traced through, committed and immutable.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::camera::{Camera, Filter};
 use crate::interaction::{Geometry, SurfaceInteraction};
@@ -12,6 +12,8 @@ use crate::texture::{TexturePoint, Textures};
 
 /// A compiled scene. Nothing in it can change or fail any more.
 pub struct World {
+    /// Where the world's coordinates begin, in those of the scene's files: what is written into images is theirs.
+    pub origin: DVec3,
     /// Film points to rays.
     pub camera: Camera,
     /// Sample offsets within a pixel.

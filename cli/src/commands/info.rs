@@ -131,6 +131,7 @@ fn failure(error: &RenderError, log: &Log) -> Failure {
         RenderError::Embree(_)
         | RenderError::OpenImageIo(_)
         | RenderError::Threads { .. }
+        | RenderError::Memory { .. }
         | RenderError::EmptySampleRange(_)
         | RenderError::Filter(_) => Failure::Render(error.to_string()),
     }

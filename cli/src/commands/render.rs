@@ -161,9 +161,10 @@ impl Reporter<'_> {
                 Failure::Input(summary)
             }
             RenderError::EmptySampleRange(_) | RenderError::Filter(_) => Failure::Usage(summary),
-            RenderError::Embree(_) | RenderError::OpenImageIo(_) | RenderError::Threads { .. } => {
-                Failure::Render(summary)
-            }
+            RenderError::Embree(_)
+            | RenderError::OpenImageIo(_)
+            | RenderError::Threads { .. }
+            | RenderError::Memory { .. } => Failure::Render(summary),
         }
     }
 }

@@ -39,11 +39,12 @@ pub fn reflect(w: Vec3, m: Vec3) -> Vec3 {
 }
 
 /// The direction `w` refracted at the normal `m` with `cos_i` = `w`·`m` ≥ 0 and `cos_t` and `eta` as in [`dielectric`];
-/// unit, pointing away from the surface on the far side.
+/// unit, pointing away from the surface on the far side. Of a large step of the index `cos_t` has few digits: what comes of
+/// it is made unit.
 #[inline]
 pub fn refract(w: Vec3, m: Vec3, cos_i: f32, cos_t: f32, eta: f32) -> Vec3 {
     let inverse = 1.0 / eta;
-    -inverse * w + (inverse * cos_i - cos_t) * m
+    (-inverse * w + (inverse * cos_i - cos_t) * m).normalize()
 }
 
 /// Fresnel's equations for a conductor with complex index `eta` − i`k` relative to the near side, per channel.

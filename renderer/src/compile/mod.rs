@@ -1,6 +1,7 @@
 //! Description → world: the last place that may fail on input.
 
 pub mod geometry;
+pub mod origin;
 
 use crate::camera::{Camera, CameraError, Filter, rendered_pixels};
 use crate::light::Lights;
@@ -28,6 +29,10 @@ struct Report<'a> {
 }
 
 impl Report<'_> {
+    fn failed(&self) -> bool {
+        self.diagnostics.iter().any(|diagnostic| diagnostic.severity == Severity::Error)
+    }
+
     fn errors(&mut self, messages: impl IntoIterator<Item = (Span, String)>) {
         self.diagnostics.extend(messages.into_iter().map(|(span, message)| self.sources.error(span, message)));
     }
@@ -76,21 +81,40 @@ pub fn world(
     );
     let materials = textures.as_ref().and_then(|textures| report.keep(Materials::build(&scene.materials, textures)));
     let (geometry, emitters) = geometry.unzip();
+    report.errors(geometry.as_ref().and_then(|geometry| too_small(scene, geometry)));
     let lights = geometry.as_ref().zip(emitters).and_then(|(geometry, emitters)| {
         report.keep(Lights::build(&scene.lights, &scene.area_lights, emitters, geometry.bounds()))
     });
     match (sensor, camera, filter, textures, geometry, materials, lights) {
-        (Some(sensor), Some(camera), Some(filter), Some(textures), Some(geometry), Some(materials), Some(lights)) => {
+        (Some(sensor), Some(camera), Some(filter), Some(textures), Some(geometry), Some(materials), Some(lights))
+            if !report.failed() =>
+        {
             let integrator = scene.integrator;
             let lights = if techniques == Techniques::Both { lights.beside_bsdf_samples() } else { lights };
-            let world = World { camera, filter, sensor, geometry, textures, materials, lights, integrator, techniques };
+            let origin = scene.origin;
+            let world =
+                World { origin, camera, filter, sensor, geometry, textures, materials, lights, integrator, techniques };
             Ok((world, report.diagnostics))
         }
         _ => {
-            debug_assert!(report.diagnostics.iter().any(|d| d.severity == Severity::Error));
+            debug_assert!(report.failed());
             Err(CompileError::Scene(report.diagnostics))
         }
     }
+}
+
+/// A ray query multiplies three lengths of a scene. Their product has all its 24 digits down to 2⁻¹²⁶⁺²⁴, so lengths must not
+/// be below the third root of that: triangles would vanish.
+const SMALLEST: f32 = 1.0 / (1u64 << 34) as f32;
+
+/// What to say of a scene of which every length is too small.
+fn too_small(scene: &Scene, geometry: &geometry::Geometry) -> Option<(Span, String)> {
+    let (low, high) = geometry.bounds();
+    let size = (high - low).max_element();
+    let text =
+        || format!("the whole scene is {size:e} across, below the {SMALLEST:e} that rays can resolve: scale it up");
+    (size > 0.0 && size < SMALLEST)
+        .then(|| (scene.shapes.first().map_or(scene.camera.span, |shape| shape.span), text()))
 }
 
 fn textures(scene: &Scene) -> StageResult<Textures> {

@@ -152,6 +152,11 @@ impl Film {
         pixels * (size_of::<Pixel>() + first_hit) as u64
     }
 
+    /// Whether the system would give the memory for a film of this shape: what it is asked for, it gives back.
+    pub fn fits_memory(bounds: Bounds, aovs: AovSet) -> bool {
+        usize::try_from(Self::memory(bounds, aovs)).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+    }
+
     /// Width and height of the whole frame.
     pub fn resolution(&self) -> [u32; 2] {
         self.resolution

@@ -84,7 +84,7 @@ impl Auxiliary {
         self.albedo += first.albedo.as_dvec3();
         self.ns += first.ns.as_dvec3();
         self.ng += first.ng.as_dvec3();
-        self.p += first.p.as_dvec3();
+        self.p += first.p;
         self.depth += f64::from(first.depth);
         self.hits += 1;
     }

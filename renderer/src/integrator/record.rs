@@ -1,6 +1,6 @@
 //! What a path brings back.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::math::Rgb;
 
@@ -24,8 +24,8 @@ pub struct FirstHit {
     pub ns: Vec3,
     /// Geometric normal.
     pub ng: Vec3,
-    /// Position.
-    pub p: Vec3,
+    /// Position, in the coordinates of the scene's files.
+    pub p: DVec3,
     /// Distance along the camera ray.
     pub depth: f32,
 }

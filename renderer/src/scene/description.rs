@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{SourceMap, Span};
 use crate::math::{Rgb, Transform};
@@ -18,6 +18,8 @@ use crate::spectrum::Spectrum;
 pub struct Scene {
     /// The files it came from: [`Span`]s below point into them.
     pub sources: SourceMap,
+    /// Where world space begins, in that of the files: at their own origin unless [`Scene::move_origin`] has moved it.
+    pub origin: DVec3,
     /// The camera.
     pub camera: Camera,
     /// The film.

@@ -2,6 +2,7 @@
 
 pub mod description;
 pub mod diagnostic;
+mod origin;
 pub mod pbrt;
 pub mod ply;
 

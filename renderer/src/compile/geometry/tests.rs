@@ -15,6 +15,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Object>, instances: Vec<Instance>) -> 
     let light = AreaLight { radiance: Rgb::ONE, image: None, two_sided: false, power: None, span };
     Scene {
         sources: Default::default(),
+        origin: glam::DVec3::ZERO,
         camera: Camera {
             world_from_camera: Transform::default(),
             kind: CameraKind::Orthographic,

@@ -59,6 +59,7 @@ pub(super) fn finish(reader: Reader) -> Result<(Scene, Vec<Diagnostic>), Vec<Dia
     }
     let scene = Scene {
         sources: files.sources,
+        origin: glam::DVec3::ZERO,
         camera,
         film,
         filter,

@@ -139,7 +139,8 @@ fn check(header: &Header) -> Result<(), PlyError> {
 
 fn read_elements(header: &Header, rows: &mut impl Rows, mesh: &mut PlyMesh) -> Result<(), PlyError> {
     let (mut vertices, mut faces) = (false, false);
-    for element in header.elements.iter().filter(|element| !element.properties.is_empty()) {
+    // As `check` chose them: an element without rows is no mesh, whatever its name.
+    for element in header.elements.iter().filter(|element| element.count > 0 && !element.properties.is_empty()) {
         match element.name.as_str() {
             "vertex" if !vertices => {
                 read_vertices(element, rows, &mut mesh.triangles)?;
