@@ -270,9 +270,16 @@ Figures, of image I against reference R, over all pixels and the three channels:
   mean ratio    mean of I over mean of R, a channel each
   blocks        median over 32 x 32 pixel blocks of the difference between the blocks' means, relative to R's
   SSIM          structural similarity of tone-mapped luminance, 1 where they look the same
+  PSNR          peak signal over noise of tone-mapped values, dB
+  HDR-FLIP      mean of what an eye sees when the images flip, at the exposures where it sees most; 0 to 1
+  predicted     relMSE that the image's own layer \"error\" stands for, and where that puts the measured one
+  z             difference of mean luminance in standard errors, of the frame and of its 8 x 8 blocks; p is the \
+probability that noise alone makes a block as bad. It needs a layer \"error\" in the image, takes the \
+reference's from such or from two of them, and needs pixels that are independent of each other, as without a filter
 
-Example:
+Examples:
   tessera compare out.exr reference.exr -o difference.exr --max-relmse 0.02 || echo too noisy
+  tessera compare out.exr half-a.exr --second-reference half-b.exr
 
 Exit codes: 0 compared and within all thresholds; 3 an image cannot be read, or the sizes differ; 5 over a threshold, \
 or pixels are not finite.")]
@@ -281,6 +288,10 @@ pub struct CompareArguments {
     pub image: PathBuf,
     /// The reference it is measured against
     pub reference: PathBuf,
+    /// Another reference, independent of the first: the squares of relMSE become products of the differences from both,
+    /// in which the references' own noise cancels; all else is against their mean
+    #[arg(long, value_name = "FILE")]
+    pub second_reference: Option<PathBuf>,
     /// Write the difference: |I - R| in R G B, I - R in signed.R signed.G signed.B
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,

@@ -7,6 +7,7 @@
 mod args;
 mod commands;
 mod exit;
+mod flip;
 mod frame_name;
 mod interrupt;
 mod inventory;
@@ -17,6 +18,7 @@ mod output;
 mod picture;
 mod progress;
 mod sanitise;
+mod significance;
 mod ssim;
 mod stats;
 mod tone;

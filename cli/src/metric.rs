@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
+use crate::flip;
 use crate::picture::Picture;
+use crate::significance::{self, Errors, Noise, Prediction, ZTest};
 use crate::ssim;
 
 /// Side of the blocks whose means are compared, in pixels: large enough that the noise of a fair reference averages out,
@@ -16,7 +18,8 @@ const RELATIVE_FLOOR: f64 = 0.01;
 pub struct Comparison {
     /// Width and height in pixels.
     pub resolution: [usize; 2],
-    /// Mean over pixels and channels of (I − R)² / (R² + 0.01 mean(R)²).
+    /// Mean over pixels and channels of (I − R)² / (R² + 0.01 mean(R)²). With a second reference S it is (I − R)(I − S) in
+    /// place of the square, so that the references' noise cancels, and everywhere else their mean is the reference.
     pub relmse: f64,
     /// The same for each channel.
     pub relmse_channels: [f64; 3],
@@ -30,38 +33,76 @@ pub struct Comparison {
     pub max_difference: f64,
     /// Structural similarity of tone-mapped luminance.
     pub ssim: f64,
+    /// Peak signal over noise of tone-mapped values, dB.
+    pub psnr: f64,
+    /// HDR-FLIP: 0 where no difference is seen, at most 1.
+    pub flip: f64,
+    /// The exposures that it looked at, in stops.
+    pub flip_exposures: [f64; 2],
+    /// Whether the noise that is known explains the difference; `None` if none is known.
+    pub z_test: Option<ZTest>,
+    /// What the image's `error` layer says; `None` without one.
+    pub predicted: Option<Prediction>,
     /// Pixels that are not finite, in the image and in the reference.
     pub non_finite: [u64; 2],
 }
 
-/// Measures `image` against `reference`, which has the same size.
-pub fn compare(image: &Picture, reference: &Picture) -> Comparison {
+/// What images are measured against.
+pub struct Reference<'a> {
+    /// The reference.
+    pub picture: &'a Picture,
+    /// Another, independent one.
+    pub second: Option<&'a Picture>,
+    /// Standard errors of the reference's pixels, if they are known.
+    pub errors: Option<Errors<'a>>,
+}
+
+/// Measures `image`, whose standard errors may be known, against a reference. All have the same size.
+pub fn compare(image: &Picture, errors: Option<Errors<'_>>, reference: &Reference<'_>) -> Comparison {
     let finite = |pixel: &[f32; 3]| pixel.iter().all(|value| value.is_finite());
-    let pairs: Vec<Pair> = image
-        .pixels
-        .iter()
-        .zip(&reference.pixels)
-        .map(|(i, r)| if finite(i) && finite(r) { Some((i.map(f64::from), r.map(f64::from))) } else { None })
+    let first = &reference.picture.pixels;
+    let second = reference.second.map_or(first, |second| &second.pixels);
+    // Half the difference between the references; the two are at R ± that.
+    let halves: Vec<[f32; 3]> =
+        first.iter().zip(second).map(|(a, b)| [0, 1, 2].map(|c| 0.5 * a[c] - 0.5 * b[c])).collect();
+    let pairs: Vec<Pair> = (image.pixels.iter().zip(first).zip(second))
+        .map(|((i, a), b)| {
+            let mean = || [0, 1, 2].map(|c| 0.5 * (f64::from(a[c]) + f64::from(b[c])));
+            (finite(i) && finite(a) && finite(b)).then(|| (i.map(f64::from), mean()))
+        })
         .collect();
     let mean_r = channel_means(&pairs, |_, r, _| r);
     let mean_i = channel_means(&pairs, |i, _, _| i);
-    let relmse_channels = channel_means(&pairs, |i, r, c| {
-        let error = (i - r).powi(2);
-        // Only a channel that is black all over has no floor, and then either no error or an infinite one.
-        if error == 0.0 { 0.0 } else { error / (r * r + RELATIVE_FLOOR * mean_r[c] * mean_r[c]) }
+    let scale = |r: f64, c: usize| r * r + RELATIVE_FLOOR * mean_r[c] * mean_r[c];
+    let relmse_channels = [0, 1, 2].map(|c| {
+        let error = |(pair, half): (&Pair, &[f32; 3])| {
+            let (difference, half) = (pair.map(|(i, r)| i[c] - r[c])?, f64::from(half[c]));
+            let square = (difference - half) * (difference + half);
+            // Only a channel that is black all over has no floor, and then either no error or an infinite one.
+            Some(if square == 0.0 { 0.0 } else { square / scale(pair.as_ref()?.1[c], c) })
+        };
+        pairs.iter().zip(&halves).filter_map(error).sum::<f64>() / pairs.iter().flatten().count().max(1) as f64
     });
     let squares = channel_means(&pairs, |i, r, _| (i - r).powi(2));
     let differences = pairs.iter().flatten().flat_map(|(i, r)| (0..3).map(|c| (i[c] - r[c]).abs()));
+    let flip = flip::hdr_flip(&pairs, image.width);
+    let halves = reference.second.map(|_| halves.as_slice());
+    let noise = Noise { image: errors, reference: reference.errors, halves };
     Comparison {
-        resolution: [reference.width, reference.height],
+        resolution: [image.width, image.height],
         relmse: relmse_channels.iter().sum::<f64>() / 3.0,
         relmse_channels,
         rmse: (squares.iter().sum::<f64>() / 3.0).sqrt(),
         mean_ratio: [0, 1, 2].map(|c| ratio(mean_i[c], mean_r[c])),
-        block_difference: median(block_differences(&pairs, reference.width)),
+        block_difference: median(block_differences(&pairs, image.width)),
         max_difference: differences.fold(0.0, f64::max),
-        ssim: ssim::ssim(&pairs, reference.width),
-        non_finite: [image, reference].map(|p| p.pixels.iter().filter(|pixel| !finite(pixel)).count() as u64),
+        ssim: ssim::ssim(&pairs, image.width),
+        psnr: ssim::psnr(&pairs),
+        flip: flip.mean,
+        flip_exposures: flip.exposures,
+        z_test: significance::z_test(&pairs, image.width, noise),
+        predicted: significance::predict(&pairs, noise, |r, c| scale(r[c], c)),
+        non_finite: [image, reference.picture].map(|p| p.pixels.iter().filter(|pixel| !finite(pixel)).count() as u64),
     }
 }
 
@@ -117,6 +158,10 @@ mod tests {
         let pixels = (0..width * height).map(|at| value(at % width, at / width)).collect();
         let window = oiio::Window::at_origin(width, height);
         Picture { width, height, pixels, data_window: window, display_window: window }
+    }
+
+    fn compare(image: &Picture, reference: &Picture) -> Comparison {
+        super::compare(image, None, &Reference { picture: reference, second: None, errors: None })
     }
 
     #[test]
@@ -175,5 +220,21 @@ mod tests {
         assert!(result.relmse.is_infinite() && result.block_difference.is_infinite());
         assert_eq!(result.mean_ratio, [None; 3]);
         assert!(result.ssim < 0.5, "{}", result.ssim);
+    }
+
+    /// References 1 ± 0.5 and an image between them: their noise cancels, and 0.3 from both sides adds.
+    #[test]
+    fn noise_of_two_references_cancels() {
+        let (a, b) = (picture(16, 16, |_, _| [1.5; 3]), picture(16, 16, |_, _| [0.5; 3]));
+        let reference = Reference { picture: &a, second: Some(&b), errors: None };
+        let found = super::compare(&picture(16, 16, |_, _| [1.0; 3]), None, &reference);
+        assert!((found.relmse + 0.25 / 1.01).abs() < 1e-12 && found.rmse == 0.0, "{found:?}");
+        let chequers = |sign: f32| picture(16, 16, |x, y| [1.0 + sign * if (x + y) % 2 == 0 { 0.5 } else { -0.5 }; 3]);
+        let (a, b) = (chequers(1.0), picture(16, 16, |_, _| [1.0; 3]));
+        let reference = Reference { picture: &a, second: Some(&b), errors: None };
+        // R is 1.25 or 0.75: Σ (0.3 ∓ 0.5) 0.3 / (R² + 0.01).
+        let found = super::compare(&picture(16, 16, |_, _| [1.3; 3]), None, &reference);
+        let expected = 0.5 * (-0.2 * 0.3 / (1.25 * 1.25 + 0.01) + 0.8 * 0.3 / (0.75 * 0.75 + 0.01));
+        assert!((found.relmse - expected).abs() < 1e-6, "{found:?} {expected}");
     }
 }

@@ -45,6 +45,15 @@ impl Picture {
     }
 }
 
+/// The same of a layer that the file need not have.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn layer(path: &Path, layer: &str) -> Result<Option<Picture>, Failure> {
+    let image = oiio::read(path).map_err(|error| Failure::Input(error.to_string()))?;
+    channels(&image.channels, Some(layer)).map(|_| Picture::read(path, Some(layer))).transpose()
+}
+
 /// Where the channels of a layer are.
 fn channels(names: &[String], layer: Option<&str>) -> Option<[Option<usize>; 3]> {
     let find = |suffix: &str| match layer {

@@ -1,4 +1,4 @@
-//! Structural similarity.
+//! How alike images look on a display: structural similarity, and signal over noise.
 
 use crate::metric::Pair;
 use crate::tone;
@@ -11,20 +11,43 @@ const SIGMA: f64 = 1.5;
 /// What the mean luminance of the reference is exposed to.
 const KEY: f64 = 0.18;
 
+/// Luminance of linear Rec.709.
+pub fn luminance(rgb: &[f64; 3]) -> f64 {
+    (0..3).map(|c| LUMINANCE[c] * rgb[c]).sum()
+}
+
+/// What makes the reference's mean luminance 0.18.
+fn exposure(pairs: &[Pair]) -> f64 {
+    let mean = pairs.iter().flatten().map(|(_, r)| luminance(r)).sum::<f64>() / pairs.len().max(1) as f64;
+    if mean > 0.0 { KEY / mean } else { 1.0 }
+}
+
+/// The display value, in [0, 1], of an exposed one.
+fn shown(exposed: f64) -> f64 {
+    let y = exposed.max(0.0);
+    f64::from(tone::srgb_from_linear((y / (1.0 + y)) as f32))
+}
+
+/// Peak signal over noise, in dB, of display values: tone-mapped as for [`ssim`], but each channel by itself. Infinite
+/// where they are the same.
+pub fn psnr(pairs: &[Pair]) -> f64 {
+    let exposure = exposure(pairs);
+    let square = |(i, r): &([f64; 3], [f64; 3])| -> f64 {
+        (0..3).map(|c| (shown(exposure * i[c]) - shown(exposure * r[c])).powi(2)).sum()
+    };
+    let count = 3 * pairs.iter().flatten().count().max(1);
+    -10.0 * (pairs.iter().flatten().map(square).sum::<f64>() / count as f64).log10()
+}
+
 /// The mean structural similarity of the luminances, tone-mapped alike: exposed so that the reference's mean becomes
 /// 0.18, compressed by y / (1 + y) and sRGB-encoded. 1 where they are the same. Pixels without a value are black in both.
 ///
 /// **Source**: \[Wang04\], with its window and constants; the window is cut off and renormalised at the image's edges.
 pub fn ssim(pairs: &[Pair], width: usize) -> f64 {
-    let luminance = |rgb: &[f64; 3]| (0..3).map(|c| LUMINANCE[c] * rgb[c]).sum::<f64>();
-    let mean = pairs.iter().flatten().map(|(_, r)| luminance(r)).sum::<f64>() / pairs.len().max(1) as f64;
-    let exposure = if mean > 0.0 { KEY / mean } else { 1.0 };
-    let shown = |rgb: &[f64; 3]| {
-        let y = (exposure * luminance(rgb)).max(0.0);
-        f64::from(tone::srgb_from_linear((y / (1.0 + y)) as f32))
-    };
+    let exposure = exposure(pairs);
+    let seen = |rgb: &[f64; 3]| shown(exposure * luminance(rgb));
     let (a, b): (Vec<f64>, Vec<f64>) =
-        pairs.iter().map(|pair| pair.as_ref().map_or((0.0, 0.0), |(i, r)| (shown(i), shown(r)))).unzip();
+        pairs.iter().map(|pair| pair.as_ref().map_or((0.0, 0.0), |(i, r)| (seen(i), seen(r)))).unzip();
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>();
     let blurred =
         [a.clone(), b.clone(), product(&a, &a), product(&b, &b), product(&a, &b)].map(|map| blur(&map, width));
@@ -85,6 +108,15 @@ mod tests {
         let spread = blur(&point, 31);
         assert!((spread.iter().sum::<f64>() - 1.0).abs() < 1e-12);
         assert!((spread[12 * 31 + 16] - spread[13 * 31 + 15]).abs() < 1e-15);
+    }
+
+    /// Mean 1 is exposed to 0.18 and shown as srgb(0.18 / 1.18); twice that as srgb(0.36 / 1.36).
+    #[test]
+    fn signal_over_noise_is_of_display_values() {
+        let found = psnr(&pairs(8, 8, |_, _| (2.0, 1.0)));
+        let shown = |y: f64| f64::from(tone::srgb_from_linear((y / (1.0 + y)) as f32));
+        assert!((found + 20.0 * (shown(0.36) - shown(0.18)).log10()).abs() < 1e-9, "{found}");
+        assert_eq!(psnr(&pairs(8, 8, |_, _| (2.0, 2.0))), f64::INFINITY);
     }
 
     #[test]

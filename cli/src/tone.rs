@@ -27,10 +27,16 @@ pub fn display(tone: Tone, linear: f32) -> f32 {
 /// A film-like curve from [0, ∞) to [0, 1).
 ///
 /// **Source**: \[Narkowicz16\] "ACES Filmic Tone Mapping Curve", with the exposure of 0.6 that it needs to keep mid-tones.
-fn filmic(linear: f32) -> f32 {
+pub fn filmic(linear: f32) -> f32 {
     // Beyond this the curve is 1 to rounding, and its squares overflow far later.
     let x = (0.6 * linear).min(1.0e6);
     (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
+}
+
+/// The linear value that [`filmic`] shows as `shown`, in [0, 1).
+pub fn filmic_inverse(shown: f64) -> f64 {
+    let (a, b, c) = (2.51 - 2.43 * shown, 0.03 - 0.59 * shown, -0.14 * shown);
+    ((b * b - 4.0 * a * c).sqrt() - b) / (2.0 * a) / 0.6
 }
 
 #[cfg(test)]
@@ -45,6 +51,14 @@ mod tests {
         }
         // 18 % grey is 118 of 255.
         assert_eq!((255.0 * srgb_from_linear(0.18)).round(), 118.0);
+    }
+
+    #[test]
+    fn the_film_curve_has_an_inverse() {
+        for shown in [0.0, 0.1, 0.5, 0.85, 0.99] {
+            // Single precision, and a slope of at least 0.02 where the curve is flattest.
+            assert!((f64::from(filmic(filmic_inverse(shown) as f32)) - shown).abs() < 1e-5, "{shown}");
+        }
     }
 
     #[test]

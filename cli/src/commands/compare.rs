@@ -1,5 +1,7 @@
 //! `tessera compare`: how far an image is from a reference.
 
+use std::path::Path;
+
 use oiio::{Channel, Format};
 
 use super::print;
@@ -7,9 +9,10 @@ use crate::args::{CompareArguments, ReportFormat};
 use crate::exit::Failure;
 use crate::job;
 use crate::log::Log;
-use crate::metric::{self, Comparison};
+use crate::metric::{self, Comparison, Reference};
 use crate::output::OutputFile;
-use crate::picture::Picture;
+use crate::picture::{self, Picture};
+use crate::significance::{Prediction, ZTest};
 
 /// Runs the command.
 pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
@@ -24,7 +27,20 @@ pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
     let image = Picture::read(&arguments.image, layer)?;
     let reference = Picture::read(&arguments.reference, layer)?;
     check_windows(&image, &reference)?;
-    let comparison = metric::compare(&image, &reference);
+    let second = arguments.second_reference.as_deref().map(|path| Picture::read(path, layer)).transpose()?;
+    second.iter().try_for_each(|second| check_windows(&image, second))?;
+    // Errors are those of R G B.
+    let errors = |path: &Path| if layer.is_none() { picture::layer(path, "error") } else { Ok(None) };
+    let (own, known) = (errors(&arguments.image)?, errors(&arguments.reference)?);
+    let comparison = metric::compare(
+        &image,
+        own.as_ref().map(|errors| errors.pixels.as_slice()),
+        &Reference {
+            picture: &reference,
+            second: second.as_ref(),
+            errors: known.as_ref().map(|errors| errors.pixels.as_slice()),
+        },
+    );
     print(&match arguments.format {
         ReportFormat::Text => text(&comparison),
         ReportFormat::Json => json(&comparison),
@@ -52,9 +68,11 @@ fn check_windows(image: &Picture, reference: &Picture) -> Result<(), Failure> {
 fn text(result: &Comparison) -> String {
     let ratio = |ratio: &Option<f64>| ratio.map_or("undefined".to_owned(), |ratio| format!("{ratio:.5}"));
     let [red, green, blue] = &result.relmse_channels;
-    format!(
+    let [first, last] = result.flip_exposures;
+    let mut text = format!(
         "pixels       {} x {}\nrelMSE       {:.6}   R {red:.6}  G {green:.6}  B {blue:.6}\nRMSE         {:.6}\n\
-         mean ratio   R {}  G {}  B {}\nblocks       {:.3} %\nSSIM         {:.5}\nmax |I - R|  {:.6}\n\
+         mean ratio   R {}  G {}  B {}\nblocks       {:.3} %\nSSIM         {:.5}\nPSNR         {:.2} dB\n\
+         HDR-FLIP     {:.5}   exposures {first:+.2} to {last:+.2}\nmax |I - R|  {:.6}\n\
          not finite   {} in the image, {} in the reference\n",
         result.resolution[0],
         result.resolution[1],
@@ -65,10 +83,23 @@ fn text(result: &Comparison) -> String {
         ratio(&result.mean_ratio[2]),
         100.0 * result.block_difference,
         result.ssim,
+        result.psnr,
+        result.flip,
         result.max_difference,
         result.non_finite[0],
         result.non_finite[1],
-    )
+    );
+    if let Some(Prediction { relmse, coverage, interval: [low, high] }) = &result.predicted {
+        text += &format!(
+            "predicted    {relmse:.6}   of such images 95 % have {low:.6} to {high:.6}; {:.1} % of the values are within \
+             1.96 standard errors\n",
+            100.0 * coverage
+        );
+    }
+    if let Some(ZTest { frame, worst, blocks, p }) = &result.z_test {
+        text += &format!("z            {frame:+.2}   worst of {blocks} blocks {worst:+.2}, p = {p:.2e}\n");
+    }
+    text
 }
 
 /// Infinite figures become `null`, as JSON has no other word for them.

@@ -70,3 +70,30 @@ fn pixels_that_are_not_finite_fail_the_comparison() {
     let run = bench.fail(&["compare", "a.exr", "b.exr"], 5, &["not finite"]);
     assert!(run.stdout.contains("1 in the image, 0 in the reference"), "{}", run.stdout);
 }
+
+/// Noise of 0.1 that the layer `error` knows: half the frame is 0.1 too bright, half too dark.
+#[test]
+fn an_error_layer_and_a_second_reference_say_what_is_noise() {
+    let bench = Bench::new();
+    let names = ["R", "G", "B", "error.R", "error.G", "error.B"];
+    bench.write_channels("image.exr", [64, 32], &names, |x, y| {
+        let value = if (x + y) % 2 == 0 { 1.1 } else { 0.9 };
+        vec![value, value, value, 0.1, 0.1, 0.1]
+    });
+    for (name, value) in [("reference.exr", 1.0), ("bright.exr", 1.1), ("dark.exr", 0.9)] {
+        bench.write_image(name, 64, 32, |_, _| [value; 3]);
+    }
+    let figures = bench.succeed(&["compare", "image.exr", "reference.exr", "--format", "json"]).json();
+    assert!((figures["predicted"]["relmse"].as_f64().unwrap() - 0.01 / 1.01).abs() < 1e-7, "{figures}");
+    assert_eq!(figures["predicted"]["coverage"], 1.0);
+    let z = |figures: &serde_json::Value| figures["z_test"]["frame"].as_f64().unwrap().abs();
+    assert!(z(&figures) < 1e-3, "{figures}");
+    let figures = bench.succeed(&["compare", "image.exr", "bright.exr", "--format", "json"]).json();
+    // 0.1 of a pixel's noise 0.1, over 64 x 32 of them.
+    assert!((z(&figures) - (64.0_f64 * 32.0).sqrt()).abs() < 0.01, "{figures}");
+    let halves = ["compare", "image.exr", "bright.exr", "--second-reference", "dark.exr", "--format", "json"];
+    let figures = bench.succeed(&halves).json();
+    assert!(figures["relmse"].as_f64().unwrap().abs() < 1e-6, "{figures}");
+    let text = bench.succeed(&halves[..5]).stdout;
+    assert!(["predicted", "HDR-FLIP", "PSNR", "worst of 32 blocks"].iter().all(|word| text.contains(word)), "{text}");
+}

@@ -73,15 +73,26 @@ impl Bench {
 
     /// Writes an EXR of R G B, 32 bits each.
     fn write_image(&self, name: &str, width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 3]) {
+        self.write_channels(name, [width, height], &["R", "G", "B"], |x, y| value(x, y).into());
+    }
+
+    /// Writes an EXR of 32-bit channels.
+    fn write_channels(
+        &self,
+        name: &str,
+        [width, height]: [usize; 2],
+        channels: &[&str],
+        value: impl Fn(usize, usize) -> Vec<f32>,
+    ) {
         let pixels: Vec<f32> = (0..width * height).flat_map(|at| value(at % width, at / width)).collect();
-        let channel = |name: &str| oiio::Channel { name: name.to_owned(), format: oiio::Format::Float };
+        let channel = |name: &&str| oiio::Channel { name: (*name).to_owned(), format: oiio::Format::Float };
         let window = oiio::Window::at_origin(width, height);
         oiio::write(&oiio::Output {
             path: &self.path(name),
             file_format: oiio::FileFormat::Exr,
             data_window: window,
             display_window: window,
-            channels: ["R", "G", "B"].map(channel).into(),
+            channels: channels.iter().map(channel).collect(),
             pixels: &pixels,
             attributes: Vec::new(),
             compression: oiio::Compression::Zip,
