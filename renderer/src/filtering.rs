@@ -170,7 +170,9 @@ impl FrameFilter {
                     blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
                 let mut values = frame.blend(&blend);
                 let coarse = expose(Vec3::splat(self.coarse)).max_element();
-                for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(v, _)| v.max_element() < coarse) {
+                // At the other end, sums of what fits singly need not fit.
+                let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
+                for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(value, _)| !usable(value)) {
                     *value = film.pixel(at).mean().as_vec3();
                 }
                 film.set_filtered(&values);

@@ -76,7 +76,9 @@ impl Film {
             }
         }
         if aovs.variance {
-            values.extend(pixel.sample_variance().as_vec3().to_array());
+            // The square of a radiance that fits need not.
+            let variance = pixel.sample_variance().min(glam::DVec3::splat(f64::from(f32::MAX)));
+            values.extend(variance.as_vec3().to_array());
         }
         if aovs.sample_count {
             values.push(pixel.count as f32);

@@ -10,6 +10,7 @@ mod energy;
 mod geometry;
 mod image;
 mod light;
+mod limits;
 mod mesh;
 mod roughness;
 mod scale;

@@ -179,3 +179,24 @@ pub fn warned(case: &str, text: &str, part: &str) -> Frame {
     assert!(warnings.iter().any(|warning| warning.contains(part)), "{case}: no \"{part}\" in {warnings:?}");
     frame
 }
+
+/// Checks that each of `cases` is a sound frame or refused at a line of its file. Prints which.
+///
+/// # Panics
+/// If it is neither.
+pub fn survives(group: &str, cases: &[(&str, String)]) {
+    for ((case, world), (mode, filtering)) in cases.iter().flat_map(|case| both().map(|mode| (case, mode))) {
+        let file = SceneFile::new(&scene([6, 6], 8, &pinhole(60.0), world));
+        match attempt(&file.path(), job(4, filtering)) {
+            Ok((frame, warnings)) => {
+                sound(&frame);
+                let said = warnings.first().and_then(|text| text.lines().next()).unwrap_or("");
+                println!("{group}, {case}, {mode}: mean {:.4e} {said}", values(&frame).mean()[1]);
+            }
+            Err(messages) => {
+                println!("{group}, {case}: {}", messages.lines().nth(1).unwrap_or(&messages));
+                assert!(messages.contains("scene.pbrt:"), "{group}, {case}: no place in {messages}");
+            }
+        }
+    }
+}

@@ -110,5 +110,10 @@ fn sensor(cx: &mut Context, params: &mut Params, exposure_time: f32) -> Mat3 {
             balance = RgbSpace::Srgb.film_from_rec709(Some(6500.0));
         }
     }
-    balance * (exposure_time * iso / 100.0)
+    let imaging_ratio = (f64::from(exposure_time) * f64::from(iso) / 100.0) as f32;
+    if !imaging_ratio.is_finite() {
+        let text = format!("an exposure of {exposure_time:e} s at ISO {iso:e} is beyond all numbers: lower either");
+        cx.report.error(params.span, text);
+    }
+    balance * imaging_ratio
 }

@@ -100,15 +100,18 @@ fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Opt
         return None;
     }
     let lower = name.to_lowercase();
+    let length = |text: &str| text.chars().count();
+    let slips = |candidate: &str| (candidate.len().max(name.len()) / 3).max(1);
     // Enough for every table of ours and for the names of most scenes; a guess is not worth more.
     const MOST: usize = 5000;
     candidates
         .into_iter()
         .take(MOST)
-        .filter(|candidate| candidate.len() <= LONGEST)
+        // As many characters as one is longer than the other have been slipped at least.
+        .filter(|candidate| candidate.len() <= LONGEST && length(candidate).abs_diff(length(name)) <= slips(candidate))
         .map(|candidate| (edit_distance(&lower, &candidate.to_lowercase()), candidate))
         .min_by_key(|&(distance, _)| distance)
-        .filter(|&(distance, candidate)| distance <= (candidate.len().max(name.len()) / 3).max(1))
+        .filter(|&(distance, candidate)| distance <= slips(candidate))
         .map(|(_, candidate)| candidate)
 }
 

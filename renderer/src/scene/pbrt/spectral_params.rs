@@ -103,8 +103,15 @@ impl Params {
                 _ => default,
             }
         };
-        if eta.is_finite() && eta > 0.0 {
+        // Squares, and products of squares, are formed of it.
+        const RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
+        if RANGE.contains(&eta) {
             return eta;
+        }
+        if eta > 0.0 {
+            let text = format!("\"{name}\" is {eta:e}: no medium is like that; give from 1e-6 to 1e6");
+            cx.report.error(self.span_of(name), text);
+            return default;
         }
         cx.report.error(self.span_of(name), format!("\"{name}\" must be more than 0, not {eta}"));
         default
