@@ -125,3 +125,17 @@ fn any_seed_gives_the_picture() {
         check_mean(&format!("seed {seed}"), &rendered, 2.0, 1e-4);
     }
 }
+
+#[test]
+fn a_large_square_image() {
+    // `ci/test-extremes` asks for 16384 pixels a side: 19 GB of sums.
+    let side = super::support::size("TESSERA_FRAME_SIDE", 1024);
+    let rendered = frame(&scene([side, side], 2, &pinhole(40.0), &sky(0.25)), job(1, Filtering::None));
+    let mean = rendered.film.mean();
+    println!(
+        "{side}×{side}: mean {mean}, {:.1} s, {} MB of film",
+        rendered.statistics.render_seconds,
+        rendered.statistics.film_bytes >> 20
+    );
+    assert_eq!(mean, glam::Vec3::splat(0.25));
+}

@@ -143,7 +143,7 @@ fn a_ply_of_nothing_is_nothing() {
 #[test]
 fn a_binary_mesh_of_many_triangles() {
     // A plane of n² quads, with as much as the test's time allows; `ci/test-extremes` asks for more.
-    let n: u32 = std::env::var("TESSERA_MESH_SIDE").ok().and_then(|n| n.parse().ok()).unwrap_or(300);
+    let n = super::support::size("TESSERA_MESH_SIDE", 300);
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
          element face {}\nproperty list uchar int vertex_indices\nend_header\n",

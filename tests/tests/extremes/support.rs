@@ -69,6 +69,11 @@ pub fn pinhole(fov: f64) -> String {
     format!("Camera \"perspective\" \"float fov\" {fov}")
 }
 
+/// A size that `ci/test-extremes` sets, or a small one.
+pub fn size(variable: &str, otherwise: u32) -> u32 {
+    std::env::var(variable).ok().and_then(|size| size.parse().ok()).unwrap_or(otherwise)
+}
+
 /// A job of `spp` samples with one seed.
 pub fn job(spp: u64, filtering: Filtering) -> Job {
     Job { spp: Some(spp), seed: Some(3), filtering, ..Job::default() }

@@ -181,3 +181,22 @@ fn texture_scales_at_both_ends() {
         check_all(&format!("uscale {scale}"), &picture(&text, 4, Filtering::None), 0.5, 1e-5);
     }
 }
+
+#[test]
+fn a_large_square_texture() {
+    // `ci/test-extremes` asks for 32768 texels a side, in bytes: 3 GB, and 4 GB with its smaller levels.
+    let side = super::support::size("TESSERA_TEXTURE_SIDE", 1024) as usize;
+    let folder = tempfile::tempdir().unwrap();
+    // A portable graymap whose columns are black and white by turns: its mean is half the light of white.
+    let mut bytes = format!("P5\n{side} {side}\n255\n").into_bytes();
+    bytes.extend((0..side * side).map(|i| if i % 2 == 0 { 0u8 } else { 255 }));
+    std::fs::write(folder.path().join("t.pgm"), bytes).unwrap();
+    let path = folder.path().join("scene.pbrt");
+    std::fs::write(&path, textured("trilinear").replace("t.exr", "t.pgm")).unwrap();
+    let (frame, _) = attempt(&path, job(4, Filtering::None)).unwrap();
+    sound(&frame);
+    let mean = values(&frame).mean()[1];
+    println!("{side}×{side} texels: mean {mean:.5}, built in {:.1} s", frame.statistics.compile_seconds);
+    // The wall of 18 units has 57 to 1820 texels a unit, its pixels are 0.07 units: level 2 or coarser, which is one grey.
+    assert!((mean - 0.5).abs() <= 0.005);
+}
