@@ -1,6 +1,7 @@
 //! The levels of a mip-mapped image and how they are stored.
 
 use glam::{IVec2, Vec2};
+use rayon::prelude::*;
 
 use super::encoding::{f32_to_half, half_to_f32};
 use super::image::{TexelData, Texels};
@@ -68,24 +69,28 @@ fn levels(width: usize, height: usize) -> Vec<Level> {
 }
 
 /// The coarser level: means over the area that each of its texels covers, exact also for odd sizes.
-fn shrink(from: &Level, to: &Level, channels: usize, value: impl Fn(usize) -> f32) -> Vec<f32> {
+fn shrink(from: &Level, to: &Level, channels: usize, value: impl Fn(usize) -> f32 + Sync) -> Vec<f32> {
     let columns: Vec<_> = (0..to.width).map(|x| cover(x, from.width, to.width)).collect();
-    let mut out = Vec::with_capacity(to.width as usize * to.height as usize * channels);
-    for y in 0..to.height {
+    let row = to.width as usize * channels;
+    let mut out = vec![0.0; row * to.height as usize];
+    out.par_chunks_mut(row).zip(0..to.height).for_each(|(out, y)| {
         let rows = cover(y, from.height, to.height);
-        for column in &columns {
-            for channel in 0..channels {
-                let mut total = 0.0;
-                for &(y, wy) in &rows {
-                    for &(x, wx) in column {
-                        total += wx * wy * value((y * from.width as usize + x) * channels + channel);
+        for (texel, column) in out.chunks_mut(channels).zip(&columns) {
+            for (channel, mean) in texel.iter_mut().enumerate() {
+                for &(y, wy) in covered(&rows) {
+                    for &(x, wx) in covered(column) {
+                        *mean += wx * wy * value((y * from.width as usize + x) * channels + channel);
                     }
                 }
-                out.push(total);
             }
         }
-    }
+    });
     out
+}
+
+/// Without the third, which only odd sizes have.
+fn covered(texels: &[(usize, f32); 3]) -> &[(usize, f32)] {
+    if texels[2].1 > 0.0 { texels } else { &texels[..2] }
 }
 
 /// Which of `from` texels the `index`th of `to` covers, with weights that sum to 1. At most three: `to` = ⌊`from` / 2⌋.
@@ -129,7 +134,7 @@ impl Storage {
 
     fn append(&mut self, values: &[f32]) {
         match self {
-            Self::U8(bytes, table) => bytes.extend(values.iter().map(|&value| nearest_byte(table, value))),
+            Self::U8(bytes, table) => bytes.par_extend(values.par_iter().map(|&value| nearest_byte(table, value))),
             Self::Half(halves) => halves.extend(values.iter().map(|&value| f32_to_half(value))),
             Self::Float(floats) => floats.extend_from_slice(values),
         }
