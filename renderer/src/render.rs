@@ -102,8 +102,8 @@ pub enum RenderError {
     EmptySampleRange(Range<u64>),
     /// The frame is larger than the machine.
     #[error(
-        "a frame of {} x {} pixels takes {} GB, more than there is memory: render parts of it with --crop or \
-         --pixel-bounds, or with fewer auxiliary outputs",
+        "a frame of {} x {} pixels takes {} GB at least, more than there is memory: render parts of it with --crop or \
+         --pixel-bounds, with fewer auxiliary outputs, or with --filter none",
         size[0], size[1], bytes.div_ceil(1_000_000_000)
     )]
     Memory {
@@ -212,11 +212,20 @@ pub struct Prepared {
 pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> {
     let pool = thread_pool(job.threads)?;
     let prepared = pool.install(|| prepare(job, observer))?;
-    let (bounds, aovs) = (prepared.world.sensor.bounds, prepared.aovs);
-    if !Film::fits_memory(bounds, aovs) {
-        return Err(RenderError::Memory { size: [bounds.width(), bounds.height()], bytes: Film::memory(bounds, aovs) });
-    }
+    check_memory(&prepared)?;
     Ok(pool.install(|| trace(prepared, job.time_limit, observer)))
+}
+
+/// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
+fn check_memory(prepared: &Prepared) -> Result<(), RenderError> {
+    let bounds = prepared.world.sensor.bounds;
+    let filter = match prepared.description.filtering {
+        Filtering::None => 0,
+        _ => Film::filter_memory(bounds) + bounds.area() * size_of::<filter::PathRecord>() as u64,
+    };
+    let bytes = Film::memory(bounds, prepared.aovs) + filter;
+    let fits = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
+    if fits { Ok(()) } else { Err(RenderError::Memory { size: [bounds.width(), bounds.height()], bytes }) }
 }
 
 /// The threads of a job.

@@ -152,9 +152,10 @@ impl Film {
         pixels * (size_of::<Pixel>() + first_hit) as u64
     }
 
-    /// Whether the system would give the memory for a film of this shape: what it is asked for, it gives back.
-    pub fn fits_memory(bounds: Bounds, aovs: AovSet) -> bool {
-        usize::try_from(Self::memory(bounds, aovs)).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+    /// Bytes that it holds besides for a filter.
+    pub fn filter_memory(bounds: Bounds) -> u64 {
+        Self::memory(bounds, AovSet::default()) / size_of::<Pixel>() as u64
+            * (size_of::<Split>() + size_of::<Rgb>()) as u64
     }
 
     /// Width and height of the whole frame.

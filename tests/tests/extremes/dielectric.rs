@@ -168,3 +168,23 @@ fn thin_glass_is_invisible_in_white() {
         check_all(&format!("thin eta {eta}"), &image, 1.0, 1e-4);
     }
 }
+
+#[test]
+fn a_thousand_interfaces_change_nothing_and_end() {
+    // Sheets between media, ten in each place, near and far: paths go through them all in a straight line.
+    let sheet = |z: f64| {
+        let far = 1e4;
+        format!(
+            "AttributeBegin\nMaterial \"interface\"\n{}AttributeEnd\n",
+            quad([[-far, -far, z], [-far, far, z], [far, far, z], [far, -far, z]])
+        )
+    };
+    let sheets: String = (1..=100).map(|i| sheet(0.01 * f64::from(i * i)).repeat(10)).collect();
+    let world = |sheets: &str| {
+        sky(1.0) + sheets + "Material \"diffuse\"\nTranslate 0 0 9\nShape \"sphere\" \"float radius\" 2\n"
+    };
+    let image = |sheets: &str| picture(&scene([16, 16], 4, &pinhole(40.0), &world(sheets)), 4, Filtering::None);
+    let worst = difference(&image(&sheets), &image(""));
+    println!("a thousand interfaces: differs by {worst:.1e}");
+    assert!(worst <= 1e-4);
+}

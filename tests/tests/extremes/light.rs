@@ -269,3 +269,52 @@ fn a_light_whose_power_overflows_is_still_finite() {
         assert!((mean / 1e36 / weak - 1.0).abs() <= 1e-3);
     }
 }
+
+#[test]
+fn the_published_filter_keeps_the_light_at_any_strength() {
+    let mean = |text: &str| values(&frame(text, job(8, super::support::talk()))).mean()[1];
+    let one = mean(&room([32, 24], 1.0, 1.0, PLAIN));
+    for level in [1e-12f32, 1e12, 1e30] {
+        let ratio = mean(&room([32, 24], 1.0, level, PLAIN)) / f64::from(level) / one;
+        println!("talk, radiance {level:e}: {ratio:.6} of the light at 1");
+        // Shares of the light are rounded at other places.
+        assert!((ratio - 1.0).abs() <= 1e-3);
+    }
+}
+
+#[test]
+fn within_a_sphere_of_light_all_is_bright() {
+    // Radiance 1 from all sides: a convex body shows its albedo, at the middle and where it touches the light.
+    for radius in [2.0, 1.000001, 1.0] {
+        let light = lamp(1.0).replace('\n', " \"bool twosided\" true\n");
+        let world =
+            format!("AttributeBegin\n{}{light}Shape \"sphere\" \"float radius\" 9\nAttributeEnd\n", diffuse(0.0));
+        let ball = format!("{}Translate 0 {} 0\nShape \"sphere\" \"float radius\" 1\n", diffuse(0.5), 9.0 - radius);
+        let camera = format!("LookAt 0 {0} -3  0 {0} 0  0 1 0\n{1}", 9.0 - radius, pinhole(8.0));
+        let rendered = frame(&scene([16, 16], 1, &camera, &(world + &ball)), job(64, Filtering::None));
+        check_mean(&format!("ball {radius} from a sphere of light"), &rendered, 0.5, 1e-4);
+    }
+}
+
+#[test]
+fn a_lamp_in_the_plane_of_a_floor_does_not_light_it() {
+    let square = |x: f64, y: f64| [[x, 0.0, y], [x, 0.0, y + 2.0], [x + 2.0, 0.0, y + 2.0], [x + 2.0, 0.0, y]];
+    // Turned about an axis of no short form, so that points of one plane are in it to rounding only.
+    let world = format!(
+        "Rotate 33 1 2 3\n{}{}{}{}",
+        diffuse(0.5),
+        quad(square(-1.0, -1.0)),
+        lamp(1e6),
+        quad(square(1.0, -1.0))
+    );
+    let eye = glam::DQuat::from_axis_angle(glam::DVec3::new(1.0, 2.0, 3.0).normalize(), 33f64.to_radians())
+        * glam::DVec3::new(0.0, 5.0, 0.0);
+    let camera = format!("LookAt {} {} {}  0 0 0  0 0 1\n{}", eye.x, eye.y, eye.z, pinhole(15.0));
+    for (name, filtering) in both() {
+        let image = picture(&scene([12, 12], 2, &camera, &world), 64, filtering);
+        // A cosine of 2⁻²⁴ of rounding at either end, of 10⁶, over a solid angle below π.
+        let worst = image.pixels.iter().flatten().copied().fold(0.0, f32::max);
+        println!("{name}: at most {worst:e} of 1e6");
+        assert!(worst <= 1e6 * 1e-6);
+    }
+}

@@ -196,3 +196,14 @@ fn positions_and_matrices_are_those_of_the_file() {
     // A pixel is 10⁻⁵ of the distance and the camera's place is rounded to f32 from where the world begins.
     assert!((ndc.truncate() - glam::DVec2::splat(0.5)).length() <= 0.1);
 }
+
+#[test]
+fn the_published_filter_far_away_keeps_the_light() {
+    for k in [0, 4, 7] {
+        let image = values(&frame(&furnace(10f64.powi(k), 1.0), job(32, super::support::talk())));
+        let mean = image.mean()[1];
+        println!("talk, moved by 10^{k}: mean {mean:.6}, expected 2");
+        // As unfiltered, see above: 8192 paths whose sum deviates by about 1.
+        assert!((mean - 2.0).abs() <= Z / 8192f64.sqrt());
+    }
+}

@@ -21,6 +21,11 @@ pub fn both() -> [(&'static str, Filtering); 2] {
     [("unfiltered", Filtering::None), ("filtered", adaptive())]
 }
 
+/// The filter as published, which must hold at the extremes as well.
+pub fn talk() -> Filtering {
+    Filtering::Talk(filter::talk::Params::default(), renderer::filtering::Selection::default())
+}
+
 /// A scene of which the size, the depth of paths and what stands before and in the world are given.
 pub fn scene(size: [u32; 2], depth: u32, camera: &str, world: &str) -> String {
     format!(

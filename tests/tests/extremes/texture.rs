@@ -231,3 +231,21 @@ fn damaged_images_are_read_or_refused() {
     println!("{read} damaged images read, {refused} refused");
     assert!(read > 0 && refused > 0);
 }
+
+#[test]
+fn environments_of_odd_sizes_are_seen_or_refused() {
+    for size in [(2, 1), (1, 2), (3, 3), (7, 3), (1, 512)] {
+        let (_folder, path) = with_image("t.exr", size, |_, _| 2.0, &environment());
+        match attempt(&path, job(16, Filtering::None)) {
+            Ok((frame, _)) => {
+                sound(&frame);
+                println!("environment of {size:?}: sky {}", values(&frame).pixels[0][1]);
+                assert_eq!(values(&frame).pixels[0][1], 2.0);
+            }
+            Err(messages) => {
+                println!("environment of {size:?}: {}", messages.lines().nth(1).unwrap_or(""));
+                assert!(messages.contains("scene.pbrt:7:") && messages.contains("t.exr"));
+            }
+        }
+    }
+}
