@@ -4,7 +4,8 @@ use renderer::filtering::Filtering;
 use tests::small::{SceneFile, values};
 
 use super::support::{
-    attempt, check_all, diffuse, frame, job, lamp, picture, pinhole, quad, refused, scene, sky, sound, survives,
+    attempt, check_all, check_mean, diffuse, frame, job, lamp, picture, pinhole, quad, refused, scene, sky, sound,
+    survives,
 };
 
 /// Numbers that no parameter expects.
@@ -121,7 +122,8 @@ fn procedural_textures_with_odd_numbers() {
             class,
             &with_odd(|x| {
                 format!(
-                    "Texture \"n\" \"float\" \"{class}\" \"float {name}\" {x}\nMaterial \"conductor\" \"texture roughness\" \"n\"\n{BALL}"
+                    "Texture \"n\" \"float\" \"{class}\" \"float {name}\" {x}\n\
+             Material \"conductor\" \"texture roughness\" \"n\"\n{BALL}"
                 )
             }),
         );
@@ -138,7 +140,8 @@ fn procedural_textures_with_odd_numbers() {
         "dots",
         &with_odd(|x| {
             format!(
-                "Texture \"n\" \"spectrum\" \"dots\" \"float uscale\" {x} \"float vdelta\" {x}\nMaterial \"diffuse\" \"texture reflectance\" \"n\"\n{BALL}"
+                "Texture \"n\" \"spectrum\" \"dots\" \"float uscale\" {x} \"float vdelta\" {x}\n\
+             Material \"diffuse\" \"texture reflectance\" \"n\"\n{BALL}"
             )
         }),
     );
@@ -146,7 +149,8 @@ fn procedural_textures_with_odd_numbers() {
         "texture space",
         &with_odd(|x| {
             format!(
-                "AttributeBegin\nScale {x} {x} {x}\nTexture \"n\" \"float\" \"windy\"\nAttributeEnd\nMaterial \"conductor\" \"texture roughness\" \"n\"\n{BALL}"
+                "AttributeBegin\nScale {x} {x} {x}\nTexture \"n\" \"float\" \"windy\"\nAttributeEnd\n\
+             Material \"conductor\" \"texture roughness\" \"n\"\n{BALL}"
             )
         }),
     );
@@ -154,7 +158,8 @@ fn procedural_textures_with_odd_numbers() {
         "bump",
         &with_odd(|x| {
             format!(
-                "Texture \"n\" \"float\" \"wrinkled\"\nTexture \"d\" \"float\" \"scale\" \"texture tex\" \"n\" \"float scale\" {x}\nMaterial \"diffuse\" \"texture displacement\" \"d\"\n{BALL}"
+                "Texture \"n\" \"float\" \"wrinkled\"\nTexture \"d\" \"float\" \"scale\" \"texture tex\" \"n\" \"float scale\" {x}\n\
+             Material \"diffuse\" \"texture displacement\" \"d\"\n{BALL}"
             )
         }),
     );
@@ -340,13 +345,14 @@ fn alpha_at_both_ends() {
         );
         check_all(&format!("alpha {alpha}"), &picture(&text, 4, Filtering::None), expected, 1e-6);
     }
-    // A million sheets that let nearly everything through, one behind the other, need not be drawn to be thought of; a hundred
-    // that are half there are black or lit at random, and their mean is known: what is not passed shows 0.5.
-    let sheets: String = (1..=100).map(|i| format!("Shape \"bilinearmesh\" \"point3 P\" [ -900 -900 {i}  900 -900 {i}  -900 900 {i}  900 900 {i} ] \"float alpha\" 0.5\n")).collect();
-    let dark = "LightSource \"infinite\" \"rgb L\" [ 0 0 0 ]\n";
-    let rendered =
-        frame(&scene([6, 6], 4, &pinhole(60.0), &(dark.to_owned() + &diffuse(0.5) + &sheets)), job(4, Filtering::None));
-    println!("a hundred sheets: mean {}", values(&rendered).mean()[1]);
+    // White sheets that are half there, one behind the other, in a white environment: white.
+    let sheet = |z: u32| {
+        let p = format!("-900 -900 {z}  900 -900 {z}  -900 900 {z}  900 900 {z}");
+        format!("Shape \"bilinearmesh\" \"point3 P\" [ {p} ] \"float alpha\" 0.5\n")
+    };
+    let sheets: String = (1..=100).map(sheet).collect();
+    let text = scene([6, 6], 1_000_000, &pinhole(60.0), &(sky(1.0) + &diffuse(1.0) + &sheets));
+    check_mean("a hundred sheets", &frame(&text, job(4, Filtering::None)), 1.0, 1e-3);
 }
 
 #[test]
