@@ -3,13 +3,15 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::grid::{Anchor, Grid, LeafCell, Place};
-use crate::pairs::{Lobe as PairLobe, Pair, Pairs};
+use crate::first::{Batch, Part, Rules};
+use crate::grid::{Anchor, CellKey, Grid, LeafCell, Place};
+use crate::pairs::{Lobe as PairLobe, Pair};
 use crate::record::{Lobe, PathRecord, Vertex};
+use crate::shards::{ShardedIndex, ShardedTable};
 use crate::shrink::{Shrinkage, estimate};
 use crate::snapshot::{Snapshot, SnapshotError};
-use crate::sums::{Deposit, LUMINANCE, Quantum};
-use crate::table::{CellIndex, PerCell, ShardedTable, Table};
+use crate::sums::{LUMINANCE, Quantum, WideSums};
+use crate::table::Table;
 
 /// Settings. The defaults are measured, not derived.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,22 +75,21 @@ pub struct Report {
     pub bytes: u64,
 }
 
-/// A tree of cells with a place for each vertex.
+/// A tree of cells of second vertices.
 #[derive(Debug)]
 struct Tree {
     grid: Grid,
     cells: ShardedTable,
 }
 
-impl Tree {
-    fn several(anchor: &Anchor, count: u32) -> Vec<Self> {
-        (0..count).map(|index| Self { grid: Grid::new(anchor, index, count), cells: ShardedTable::default() }).collect()
-    }
+/// The grids of several trees.
+fn grids(anchor: &Anchor, count: u32) -> impl Iterator<Item = Grid> {
+    (0..count).map(move |index| Grid::new(anchor, index, count))
 }
 
 /// A vertex as grids see it, with finest cells of `side` footprints.
 #[inline]
-fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
+pub(crate) fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
     let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
     Place::new(vertex.p, vertex.n.direction(), side * vertex.footprint.get(), attributes)
 }
@@ -98,13 +99,16 @@ fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
 pub struct Adaptive {
     params: Params,
     quantum: Quantum,
-    diffuse: Vec<Tree>,
-    glossy: Vec<Tree>,
+    /// Of first vertices, in both lobes.
+    grids: Vec<Grid>,
     second: Vec<Tree>,
-    /// By part.
-    pairs: Vec<Pairs>,
+    parts: Vec<Part>,
+    /// Cells of other filters that no slot reads.
+    unread: [Vec<Table<LeafCell>>; 2],
     /// Number of the current epoch, once there is one.
     epoch: Option<u64>,
+    /// Different cells at the first vertex, once they were counted.
+    cells: Option<u64>,
     report: Report,
 }
 
@@ -119,11 +123,14 @@ impl Adaptive {
         Self {
             params: *params,
             quantum: Quantum::new(params.unit),
-            diffuse: Tree::several(anchor, params.trees),
-            glossy: Tree::several(anchor, params.trees),
-            second: Tree::several(anchor, params.second_trees),
-            pairs: (0..parts).map(|_| Pairs::default()).collect(),
+            grids: grids(anchor, params.trees).collect(),
+            second: grids(anchor, params.second_trees)
+                .map(|grid| Tree { grid, cells: ShardedTable::default() })
+                .collect(),
+            parts: (0..parts).map(|_| Part::new(params.trees as usize)).collect(),
+            unread: Part::new(params.trees as usize).cells,
             epoch: None,
+            cells: None,
             report: Report::default(),
         }
     }
@@ -139,7 +146,7 @@ impl Adaptive {
 
     /// Forgets what second vertices shared: those of the blocks to come share among themselves.
     pub fn begin_epoch(&mut self) {
-        self.second.iter_mut().for_each(|tree| tree.cells.clear());
+        self.second.iter().for_each(|tree| tree.cells.clear());
     }
 
     /// Adds a block of paths, by part. A slot belongs to one part for good.
@@ -149,75 +156,55 @@ impl Adaptive {
     /// # Panics
     /// If there are not as many parts as were announced.
     pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
-        assert_eq!(parts.len(), self.pairs.len(), "parts of a block");
+        assert_eq!(parts.len(), self.parts.len(), "parts of a block");
         let suffixes = self.suffixes(parts);
-        let unfiltered: Vec<u64> = (&mut self.pairs, parts, &suffixes)
+        let rules = Rules { params: &self.params, quantum: &self.quantum, grids: &self.grids };
+        let unfiltered = (&mut self.parts, parts, &suffixes)
             .into_par_iter()
-            .map_init(
-                || FirstVertices::new(&self.params, &self.quantum, &self.diffuse, &self.glossy),
-                |block, (pairs, records, suffixes)| {
-                    for (record, &suffix) in records.iter().zip(suffixes) {
-                        block.add(record, suffix, pairs);
-                    }
-                    block.finish(pairs)
-                },
-            )
-            .collect();
+            .map_init(Batch::default, |batch, (part, records, suffixes)| part.add(records, suffixes, &rules, batch));
+        self.report.unfiltered += unfiltered.sum::<u64>();
         self.report.paths += parts.iter().map(|records| records.len() as u64).sum::<u64>();
-        self.report.unfiltered += unfiltered.iter().sum::<u64>();
+        self.cells = None;
     }
 
     /// What arrives at the second vertex of each path, filtered over the block.
     fn suffixes(&mut self, parts: &[Vec<PathRecord>]) -> Vec<Vec<Vec3>> {
-        let trees = &self.second;
-        let places: Vec<Vec<Option<CellIndex>>> = parts
+        let (trees, quantum) = (&self.second, &self.quantum);
+        let places: Vec<SecondVertices> = parts
             .par_iter()
-            .map(|records| second_vertices(records, trees, self.params.second_leaf, &self.quantum))
+            .map(|records| SecondVertices::new(records, trees, self.params.second_leaf, quantum))
             .collect();
-        let estimates: Vec<PerCell<[f32; 3]>> = self
-            .second
-            .par_iter_mut()
-            .map(|tree| estimate(&mut tree.cells, &self.quantum, &self.params.shrinkage))
-            .collect();
-        let share = (estimates.len() as f32).recip();
-        let suffixes = parts
-            .par_iter()
-            .zip(&places)
-            .map(|(records, places)| {
-                let read = |(i, record): (usize, &PathRecord)| {
-                    let mut mean = Vec3::ZERO;
-                    for (tree, places) in estimates.iter().zip(places.chunks_exact(records.len())) {
-                        // A vertex that no cell took keeps its own light.
-                        let Some(place) = places[i] else { return record.suffix.get() };
-                        mean += Vec3::from_array(tree.get(place));
-                    }
-                    mean * share
-                };
-                records.iter().enumerate().map(read).collect()
-            })
-            .collect();
-        self.report.second_cells = self.second.iter_mut().map(|tree| tree.cells.len() as u64).sum();
-        suffixes
+        self.report.second_cells = 0;
+        let mut estimates = Vec::new();
+        for tree in trees {
+            let (estimate, cells) = estimate(&tree.cells.tables(), quantum, &self.params.shrinkage);
+            estimates.push(estimate);
+            self.report.second_cells += cells;
+        }
+        parts.par_iter().zip(&places).map(|(records, places)| places.read(records, &estimates)).collect()
+    }
+
+    /// The tables of the first vertices' tree, diffuse and then glossy, by part; last, those that no slot reads.
+    fn tables(&self, tree: usize) -> Vec<&Table<LeafCell>> {
+        let (lobe, tree) = (tree / self.grids.len(), tree % self.grids.len());
+        let parts = self.parts.iter().map(|part| &part.cells);
+        parts.chain([&self.unread]).map(|cells| &cells[lobe][tree]).collect()
     }
 
     /// All sums so far, the same whoever met which cell first.
     pub fn snapshot(&mut self) -> Snapshot {
+        let trees = 2 * self.grids.len();
         let mut snapshot = Snapshot { paths: [self.report.paths, self.report.unfiltered], ..Snapshot::default() };
         let mut numbers = Vec::new();
-        for tree in self.diffuse.iter_mut().chain(&mut self.glossy) {
-            let mut cells: Vec<_> = tree.cells.cells().collect();
-            cells.sort_unstable_by_key(|(_, key, _)| *key);
-            let mut number = PerCell::new(&mut tree.cells);
-            cells.iter().zip(0u32..).for_each(|((place, ..), at)| number.set(*place, at));
-            snapshot.trees.push(cells.into_iter().map(|(_, key, sums)| (key, sums)).collect());
+        for tree in 0..trees {
+            let (cells, number) = merged(&self.tables(tree));
+            snapshot.trees.push(cells);
             numbers.push(number);
         }
-        for pairs in &mut self.pairs {
-            let (pairs, own) = pairs.parts();
-            let mut pairs: Vec<Pair> = pairs
-                .iter()
-                .map(|pair| pair.with_cell(numbers[pair.tree_of(numbers.len())].get(pair.index() as u32)))
-                .collect();
+        for (at, part) in self.parts.iter_mut().enumerate() {
+            let (pairs, own) = part.pairs.parts();
+            let mut pairs: Vec<Pair> =
+                pairs.iter().map(|pair| pair.with_cell(numbers[pair.tree_of(trees)][at][pair.index()])).collect();
             pairs.sort_unstable_by_key(Pair::order);
             snapshot.pairs.push(pairs);
             snapshot.own.push(own.to_vec());
@@ -230,70 +217,135 @@ impl Adaptive {
     /// # Errors
     /// The other has other trees or parts; then nothing was added.
     pub fn absorb(&mut self, other: &Snapshot) -> Result<(), SnapshotError> {
-        let trees = self.diffuse.len() + self.glossy.len();
-        if other.trees.len() != trees || other.pairs.len() != self.pairs.len() || other.own.len() != self.pairs.len() {
+        let trees = 2 * self.grids.len();
+        let parts = self.parts.len();
+        if other.trees.len() != trees || other.pairs.len() != parts || other.own.len() != parts {
             return Err(SnapshotError::Mismatch);
         }
-        let mut places: Vec<Vec<CellIndex>> = Vec::with_capacity(trees);
-        for (tree, cells) in self.diffuse.iter_mut().chain(&mut self.glossy).zip(&other.trees) {
-            places.push(cells.iter().map(|(key, sums)| tree.cells.add_sums(*key, sums)).collect());
+        // The first part that reads a cell takes its sums.
+        let mut taken: Vec<Vec<bool>> = other.trees.iter().map(|cells| vec![false; cells.len()]).collect();
+        for ((part, pairs), own) in self.parts.iter_mut().zip(&other.pairs).zip(&other.own) {
+            let Part { cells, pairs: mine } = part;
+            let read = pairs.iter().map(|pair| {
+                let (tree, at) = (pair.tree_of(trees), pair.index());
+                let (key, sums) = &other.trees[tree][at];
+                let table = &mut cells[tree / (trees / 2)][tree % (trees / 2)];
+                let cell = table.cell((*key).into());
+                if !std::mem::replace(&mut taken[tree][at], true) {
+                    table.merge(cell, sums);
+                }
+                pair.with_cell(cell)
+            });
+            mine.absorb(read, own);
         }
-        for ((mine, pairs), own) in self.pairs.iter_mut().zip(&other.pairs).zip(&other.own) {
-            mine.absorb(pairs.iter().map(|pair| pair.with_cell(places[pair.tree_of(trees)][pair.index()])), own);
+        for ((table, cells), taken) in self.unread.iter_mut().flatten().zip(&other.trees).zip(&taken) {
+            for ((key, sums), _) in cells.iter().zip(taken).filter(|(_, taken)| !**taken) {
+                let cell = table.cell((*key).into());
+                table.merge(cell, sums);
+            }
         }
         self.report.paths += other.paths[0];
         self.report.unfiltered += other.paths[1];
+        self.cells = None;
         Ok(())
     }
 
     /// What each slot of each part gets from all paths so far; slots without a path are left out.
     pub fn resolve(&mut self) -> Vec<Vec<(u32, Resolved)>> {
-        let (quantum, shrinkage) = (&self.quantum, &self.params.shrinkage);
-        let estimates = |trees: &mut Vec<Tree>| -> Vec<PerCell<[f32; 3]>> {
-            trees.par_iter_mut().map(|tree| estimate(&mut tree.cells, quantum, shrinkage)).collect()
+        let estimates = self.estimates();
+        let (quantum, trees) = (&self.quantum, self.grids.len());
+        let resolve = |(at, part): (usize, &mut Part)| {
+            let read =
+                |lobe: PairLobe, tree: usize, cell: u32| estimates[lobe as usize * trees + tree][at][cell as usize];
+            part.pairs.resolve(quantum, read)
         };
-        let (diffuse, glossy) = (estimates(&mut self.diffuse), estimates(&mut self.glossy));
-        let read = |lobe: PairLobe, tree: usize, cell: CellIndex| match lobe {
-            PairLobe::Diffuse => diffuse[tree].get(cell),
-            PairLobe::Glossy => glossy[tree].get(cell),
-        };
-        self.pairs.par_iter_mut().map(|pairs| pairs.resolve(quantum, read)).collect()
+        self.parts.par_iter_mut().enumerate().map(resolve).collect()
+    }
+
+    /// The estimate of each cell of each part, tree by tree: one after the other, for each needs room to work.
+    fn estimates(&mut self) -> Vec<Vec<Vec<[f32; 3]>>> {
+        let mut count = 0;
+        let estimates = (0..2 * self.grids.len()).map(|tree| {
+            let (estimates, cells) = estimate(&self.tables(tree), &self.quantum, &self.params.shrinkage);
+            count += cells;
+            estimates
+        });
+        let estimates = estimates.collect();
+        self.cells = Some(count);
+        estimates
     }
 
     /// What was done so far.
     pub fn report(&mut self) -> Report {
-        let trees = self.diffuse.iter_mut().chain(&mut self.glossy);
-        let (mut cells, mut bytes) = (0, 0);
-        for tree in trees {
-            cells += tree.cells.len() as u64;
-            bytes += tree.cells.bytes() as u64;
+        if self.cells.is_none() {
+            self.estimates();
         }
-        let pairs = self.pairs.iter().map(|pairs| pairs.len() as u64).sum();
-        bytes += self.pairs.iter().map(|pairs| pairs.bytes() as u64).sum::<u64>();
-        Report { cells, pairs, bytes, ..self.report }
+        let bytes = self.parts.iter().map(Part::bytes).sum::<usize>()
+            + self.unread.iter().flatten().map(Table::bytes).sum::<usize>()
+            + self.second.iter().map(|tree| tree.cells.bytes()).sum::<usize>();
+        let pairs = self.parts.iter().map(|part| part.pairs.len() as u64).sum();
+        Report { cells: self.cells.unwrap_or_default(), pairs, bytes: bytes as u64, ..self.report }
     }
 }
 
-/// Deposits the second vertices of a part; places of the cells, tree by tree.
-fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Vec<Option<CellIndex>> {
-    let mut places = vec![None; records.len() * trees.len()];
-    let deposits: Vec<Option<(Place, Deposit)>> = records
-        .iter()
-        .map(|record| {
-            let deposit = quantum.deposit(record.suffix.get(), weight(record))?;
-            record.second.exists().then(|| (place(&record.second, side, 0), deposit))
-        })
-        .collect();
-    let mut keyed = Vec::with_capacity(records.len());
-    for (tree, places) in trees.iter().zip(places.chunks_exact_mut(records.len().max(1))) {
-        keyed.clear();
-        keyed.extend(deposits.iter().map(|deposit| {
-            let (place, deposit) = deposit.as_ref()?;
-            Some((tree.grid.leaf(place)?, *deposit))
-        }));
-        tree.cells.add(&keyed, places);
+/// A tree's cells over all tables by key, and the numbers there of each table's cells.
+fn merged(tables: &[&Table<LeafCell>]) -> (Vec<(CellKey, WideSums)>, Vec<Vec<u32>>) {
+    let mut order: Vec<(CellKey, u32, u32)> = Vec::with_capacity(tables.iter().map(|table| table.len()).sum());
+    for (at, table) in (0..).zip(tables) {
+        order.extend(table.keys().zip(0..).map(|(key, cell)| (key, at, cell)));
     }
-    places
+    order.par_sort_unstable();
+    let mut numbers: Vec<Vec<u32>> = tables.iter().map(|table| vec![0; table.len()]).collect();
+    let mut cells = Vec::new();
+    for same in order.chunk_by(|a, b| a.0 == b.0) {
+        let mut sums = WideSums::default();
+        for &(_, table, cell) in same {
+            sums.merge(&tables[table as usize].sums(cell));
+            numbers[table as usize][cell as usize] = cells.len() as u32;
+        }
+        cells.push((same[0].0, sums));
+    }
+    (cells, numbers)
+}
+
+/// The second vertices of a part of a block.
+struct SecondVertices {
+    /// Which paths have one that a cell took.
+    taken: Vec<bool>,
+    /// Places of those, tree by tree.
+    places: Vec<Vec<ShardedIndex>>,
+}
+
+impl SecondVertices {
+    /// Deposits them.
+    fn new(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Self {
+        let deposit = |record: &PathRecord| {
+            let deposit = quantum.deposit(record.suffix.get(), weight(record))?;
+            let place = record.second.exists().then(|| place(&record.second, side, 0))?;
+            // All trees take it or none.
+            trees.iter().all(|tree| tree.grid.leaf(&place).is_some()).then_some((place, deposit))
+        };
+        let deposits: Vec<Option<(Place, _)>> = records.iter().map(deposit).collect();
+        let in_tree = |tree: &Tree| {
+            let keyed =
+                deposits.iter().flatten().filter_map(|(place, deposit)| Some((tree.grid.leaf(place)?, *deposit)));
+            tree.cells.add(&keyed.collect::<Vec<_>>())
+        };
+        Self { taken: deposits.iter().map(Option::is_some).collect(), places: trees.iter().map(in_tree).collect() }
+    }
+
+    /// What arrives at each path's, given the estimates of all cells, tree by tree.
+    fn read(&self, records: &[PathRecord], estimates: &[Vec<Vec<[f32; 3]>>]) -> Vec<Vec3> {
+        let share = (estimates.len() as f32).recip();
+        let mut next = 0..;
+        let read = |(record, &taken): (&PathRecord, &bool)| {
+            // A vertex that no cell took keeps its own light.
+            let Some(at) = taken.then(|| next.next()).flatten() else { return record.suffix.get() };
+            let found = self.places.iter().zip(estimates).map(|(places, tree)| Vec3::from_array(places[at].of(tree)));
+            found.sum::<Vec3>() * share
+        };
+        records.iter().zip(&self.taken).map(read).collect()
+    }
 }
 
 /// What light at the second vertex counts for in the slot: as weights of the mean over a cell these keep its energy, for
@@ -301,89 +353,6 @@ fn second_vertices(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &
 fn weight(record: &PathRecord) -> f32 {
     let through = |lobe: &Lobe| lobe.throughput.get() * lobe.transfer.get();
     (through(&record.diffuse) + through(&record.glossy)).dot(LUMINANCE.as_vec3()).abs()
-}
-
-/// The first vertices of a part of a block, gathered in small tables before they go to the large ones: neighbouring
-/// pixels share cells, so this saves most of the way to memory.
-struct FirstVertices<'a> {
-    params: &'a Params,
-    quantum: &'a Quantum,
-    diffuse: Vec<(&'a Tree, Table<LeafCell>)>,
-    glossy: Vec<(&'a Tree, Table<LeafCell>)>,
-    /// Places of a small table's cells in the large one.
-    indices: Vec<CellIndex>,
-    unfiltered: u64,
-}
-
-impl<'a> FirstVertices<'a> {
-    fn new(params: &'a Params, quantum: &'a Quantum, diffuse: &'a [Tree], glossy: &'a [Tree]) -> Self {
-        let local = |trees: &'a [Tree]| trees.iter().map(|tree| (tree, Table::default())).collect();
-        Self { params, quantum, diffuse: local(diffuse), glossy: local(glossy), indices: Vec::new(), unfiltered: 0 }
-    }
-
-    fn add(&mut self, record: &PathRecord, suffix: Vec3, pairs: &mut Pairs) {
-        let glossy = record.glossy.incident(suffix);
-        if !record.glossy.is_black() {
-            pairs.add_own(record.slot, record.odd(), record.glossy.throughput.get() * glossy, self.quantum);
-        }
-        let mut kept = true;
-        for (lobe, incident, trees, kind) in [
-            (&record.diffuse, record.diffuse.incident(suffix), &mut self.diffuse, PairLobe::Diffuse),
-            (&record.glossy, glossy, &mut self.glossy, PairLobe::Glossy),
-        ] {
-            if lobe.is_black() {
-                continue;
-            }
-            let bin = if kind == PairLobe::Glossy { record.first.bin() } else { 0 };
-            let cell = self.quantum.deposit(incident, 1.0).filter(|_| record.first.exists()).and_then(|deposit| {
-                deposit_in_all(trees, &place(&record.first, self.params.leaf, bin), record.sample(), &deposit)
-            });
-            let throughput = lobe.throughput.get();
-            match cell {
-                Some((tree, cell)) if pairs.add(record.slot, kind, tree, cell, throughput) => {}
-                _ => {
-                    kept = false;
-                    pairs.add_unfiltered(record.slot, kind, throughput * incident, self.quantum);
-                }
-            }
-        }
-        self.unfiltered += u64::from(!kept);
-    }
-
-    /// Moves everything to the large tables; how many paths stay unfiltered.
-    fn finish(&mut self, pairs: &mut Pairs) -> u64 {
-        for (kind, trees) in [(PairLobe::Diffuse, &mut self.diffuse), (PairLobe::Glossy, &mut self.glossy)] {
-            for (at, (tree, local)) in (0..).zip(trees) {
-                tree.cells.merge(local, &mut self.indices);
-                pairs.renumber(kind, at, &self.indices);
-                local.clear();
-            }
-        }
-        pairs.end_block();
-        std::mem::take(&mut self.unfiltered)
-    }
-}
-
-/// Adds to a cell of every tree; the tree that the path reads, and the number of its cell there.
-#[inline]
-fn deposit_in_all(
-    trees: &mut [(&Tree, Table<LeafCell>)],
-    place: &Place,
-    sample: u8,
-    deposit: &Deposit,
-) -> Option<(u32, u32)> {
-    let read = u32::from(sample) % trees.len() as u32;
-    let mut found = None;
-    // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of
-    // those, and the path reads its own light.
-    for (at, (tree, local)) in (0..).zip(trees.iter_mut()) {
-        let cell = local.cell(tree.grid.leaf(place)?);
-        local.add(cell, deposit);
-        if at == read {
-            found = Some((read, cell));
-        }
-    }
-    found
 }
 
 #[cfg(test)]

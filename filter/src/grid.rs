@@ -24,11 +24,13 @@ pub struct CellKey(u128);
 
 /// Bits of each coordinate of a cell.
 const COORDINATE_BITS: u32 = 21;
+/// A coordinate's bits.
+const COORDINATE: u64 = (1 << COORDINATE_BITS) - 1;
 const LEVEL_BIAS: i32 = 1 << 14;
 
 impl CellKey {
     /// A cell of a level, by its coordinates in ±2²⁰.
-    #[inline]
+    #[cfg(test)]
     fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
         let [x, y, z] = cell.map(|x| spread(x as u64));
         let level = (level + LEVEL_BIAS) as u16;
@@ -48,6 +50,18 @@ impl CellKey {
         // An arithmetic shift of each coordinate: the three signs stay on top.
         let halved = morton >> 3 | morton & SIGNS;
         Self(((self.0 >> 64 << 64) + (1 << 112)) | u128::from(halved))
+    }
+
+    /// The cell of `level` that holds this one, which is no coarser.
+    #[inline]
+    pub fn ancestor(self, level: i32) -> Self {
+        let up = (level - self.level()) as u32;
+        let morton = self.0 as u64;
+        // As in `parent`, all at once: what comes in from above is the signs, over and over.
+        let gone = 3 * up.min(COORDINATE_BITS);
+        let signs = (morton >> (3 * (COORDINATE_BITS - 1))) * EVERY_THIRD;
+        let shifted = morton >> gone | signs & !(MORTON >> gone) & MORTON;
+        Self(((self.0 >> 64 << 64) + (u128::from(up) << 112)) | u128::from(shifted))
     }
 
     /// Well mixed bits.
@@ -70,18 +84,35 @@ impl CellKey {
 /// The signs of the three coordinates in a Morton code.
 const SIGNS: u64 = 7 << (3 * (COORDINATE_BITS - 1));
 
+/// All bits of a Morton code.
+const MORTON: u64 = (1 << (3 * COORDINATE_BITS)) - 1;
+
+/// One bit of three in a Morton code, that of the first coordinate.
+const EVERY_THIRD: u64 = MORTON / 7;
+
 /// Attributes that fit in a key.
 const ATTRIBUTES: u64 = (1 << 48) - 1;
 
 /// Puts two zeros between the lower 21 bits of a number.
 #[inline]
 fn spread(x: u64) -> u64 {
-    let mut x = x & 0x1f_ffff;
+    let mut x = x & COORDINATE;
     x = (x | x << 32) & 0x001f_0000_0000_ffff;
     x = (x | x << 16) & 0x001f_0000_ff00_00ff;
     x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
     x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
     (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// Undoes [`spread`], whatever is in the bits between.
+#[inline]
+fn gather(x: u64) -> u64 {
+    let mut x = x & 0x1249_2492_4924_9249;
+    x = (x | x >> 2) & 0x10c3_0c30_c30c_30c3;
+    x = (x | x >> 4) & 0x100f_00f0_0f00_f00f;
+    x = (x | x >> 8) & 0x001f_0000_ff00_00ff;
+    x = (x | x >> 16) & 0x001f_0000_0000_ffff;
+    (x | x >> 32) & COORDINATE
 }
 
 /// One tree of nested cells.
@@ -123,37 +154,68 @@ impl Grid {
     pub fn leaf(&self, place: &Place) -> Option<LeafCell> {
         const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
         let level = place.level.max(self.finest);
-        let cell = ((place.p - self.corner) * (self.inverse_scale * power_of_two(-level))).floor();
-        // ±2²⁰ cells: further away than any footprint is small.
-        let within = cell.min_element() >= -HALF && cell.max_element() < HALF;
-        let attributes = place.attributes << 3 | u64::from(facing(self.turn * place.n));
-        within.then(|| LeafCell { attributes, level, cell: cell.as_ivec3().to_array() })
+        let at = (place.p - self.corner) * (self.inverse_scale * power_of_two(-level));
+        // ±2²⁰ cells: further away than any footprint is small. The borders are whole, so this holds for the floor too.
+        let within = at.min_element() >= -HALF && at.max_element() < HALF;
+        let attributes = place.attributes << FACING_BITS | u64::from(facing(self.turn * place.n));
+        within.then(|| LeafCell::new(level, attributes, at.to_array().map(floor)))
     }
 }
 
-/// A cell by its coordinates: quicker to find again than to spell as a [`CellKey`].
+/// Bits of an attribute that say which way a surface faces.
+const FACING_BITS: u32 = 3;
+
+/// ⌊x⌋ of a number that fits: without a call, which the baseline of x86-64 needs for f64::floor.
+#[inline]
+fn floor(x: f64) -> i32 {
+    let whole = x as i32;
+    whole - i32::from(f64::from(whole) > x)
+}
+
+/// A cell by its coordinates: quicker to make than a [`CellKey`], and as exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LeafCell {
-    attributes: u64,
-    level: i32,
-    cell: [i32; 3],
+    /// The upper half of the [`CellKey`].
+    level_and_attributes: u64,
+    /// Coordinates, one after the other.
+    cell: u64,
 }
 
 impl LeafCell {
+    #[inline]
+    fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
+        let [x, y, z] = cell.map(|x| x as u64 & COORDINATE);
+        let level_and_attributes = u64::from((level + LEVEL_BIAS) as u16) << 48 | attributes & ATTRIBUTES;
+        Self { level_and_attributes, cell: x | y << COORDINATE_BITS | z << (2 * COORDINATE_BITS) }
+    }
+
+    /// The cell of the same place for vertices of attributes that differ by `bin` in their lower bits, which are 0 here.
+    #[inline]
+    pub fn with_bin(self, bin: u8) -> Self {
+        Self { level_and_attributes: self.level_and_attributes | u64::from(bin) << FACING_BITS, ..self }
+    }
+
     /// The cell's key.
     #[inline]
     pub fn key(&self) -> CellKey {
-        CellKey::new(self.level, self.attributes, self.cell)
+        let [x, y, z] = [0, 1, 2].map(|axis| spread(self.cell >> (axis * COORDINATE_BITS)));
+        CellKey(u128::from(self.level_and_attributes) << 64 | u128::from(x | y << 1 | z << 2))
     }
 
     /// Bits that differ between the cells of a neighbourhood: good enough for a small table.
     #[inline]
     pub fn quick_hash(&self) -> u64 {
-        let [x, y, z] = self.cell.map(|x| u64::from(x as u32));
-        let words = x | y << 32;
-        let more = (z | u64::from(self.level as u32) << 32) ^ self.attributes.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let mixed = (words.wrapping_mul(0xd6e8_feb8_6659_fd93) ^ more).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        let mixed = self.cell.wrapping_mul(0xd6e8_feb8_6659_fd93) ^ self.level_and_attributes;
+        let mixed = (mixed ^ mixed >> 32).wrapping_mul(0xff51_afd7_ed55_8ccd);
         mixed ^ mixed >> 32
+    }
+}
+
+impl From<CellKey> for LeafCell {
+    fn from(key: CellKey) -> Self {
+        let [x, y, z] = [0, 1, 2].map(|axis| gather(key.0 as u64 >> axis));
+        let cell = x | y << COORDINATE_BITS | z << (2 * COORDINATE_BITS);
+        Self { level_and_attributes: (key.0 >> 64) as u64, cell }
     }
 }
 
@@ -233,6 +295,13 @@ mod tests {
             let there = b.leaf(&Place::new([x * s, y * s, s], Vec3::X, side * s, 1)).unwrap().key();
             prop_assert_eq!(there.level(), at.level() + e);
             prop_assert_eq!(there.bits() << 16, at.bits() << 16);
+        }
+
+        #[test]
+        fn ancestors_are_parents_of_parents(c in any::<[i32; 3]>(), up in 0i32..30) {
+            let key = CellKey::new(-7, 9, c.map(|x| x >> 11));
+            prop_assert_eq!(key.ancestor(key.level() + up), (0..up).fold(key, |key, _| key.parent()));
+            prop_assert_eq!(LeafCell::from(key).key(), key);
         }
 
         #[test]

@@ -60,11 +60,14 @@
 #![forbid(unsafe_code)]
 
 pub mod adaptive;
+mod buckets;
+mod first;
 mod grid;
 mod hash;
 mod packed;
 mod pairs;
 mod record;
+mod shards;
 mod shrink;
 mod snapshot;
 mod sums;

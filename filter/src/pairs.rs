@@ -4,7 +4,6 @@ use glam::{DVec3, Vec3};
 
 use crate::adaptive::Resolved;
 use crate::sums::Quantum;
-use crate::table::CellIndex;
 
 /// Which estimate a pair reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,14 +14,14 @@ pub(crate) enum Lobe {
     Glossy,
 }
 
-/// A slot, a cell, and the throughput of all paths between them. 20 bytes.
+/// A slot, a cell of its part, and the throughput of all paths between them. 20 bytes.
 ///
 /// Throughputs are whole multiples of 2⁻²⁰, so sums are exact in any order; a sum that would overflow begins another pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pair {
     /// Slot, and below it the lobe and the tree: [`Pair::label`].
     slot_lobe_tree: u32,
-    cell: CellIndex,
+    cell: u32,
     throughput: [i32; 3],
 }
 
@@ -118,8 +117,6 @@ pub(crate) struct Pairs {
     /// Sorted and without repetition up to `compact`, then as they came.
     pairs: Vec<Pair>,
     compact: usize,
-    /// Where the current block began: there, cells have the numbers of the part's own tables.
-    block: usize,
     /// By slot.
     own: Vec<(u32, Own)>,
     /// Where in it the last path's slot is.
@@ -130,7 +127,7 @@ impl Pairs {
     /// A path of `slot` reads `cell` of a tree; false if its throughput does not fit, 2¹¹ or not a number.
     #[inline]
     #[must_use]
-    pub fn add(&mut self, slot: u32, lobe: Lobe, tree: u32, cell: CellIndex, throughput: Vec3) -> bool {
+    pub fn add(&mut self, slot: u32, lobe: Lobe, tree: u32, cell: u32, throughput: Vec3) -> bool {
         const SCALE: f32 = (1 << THROUGHPUT_BITS) as f32;
         if !throughput.is_finite() || throughput.abs().max_element() >= (i32::MAX as f32) / SCALE {
             return false;
@@ -138,8 +135,9 @@ impl Pairs {
         let throughput = (throughput * SCALE).to_array().map(|x| (x + 0.5f32.copysign(x)) as i32);
         let pair = Pair { slot_lobe_tree: Pair::label(slot, lobe, tree), cell, throughput };
         // A pixel's samples come one after the other and mostly read one of a few cells.
-        let recent = self.pairs.len().saturating_sub(8).max(self.block);
-        let known = self.pairs[recent..].iter_mut().find(|known| known.order() == pair.order());
+        let recent = self.pairs.len().saturating_sub(8);
+        let mut of_slot = self.pairs[recent..].iter_mut().rev().take_while(|known| known.slot() == slot);
+        let known = of_slot.find(|known| known.order() == pair.order());
         if !known.is_some_and(|known| known.absorb(&pair)) {
             self.pairs.push(pair);
         }
@@ -168,28 +166,17 @@ impl Pairs {
         &mut self.own[self.last].1
     }
 
-    /// Gives the pairs of the current block that read `tree` the numbers of the large tables.
-    pub fn renumber(&mut self, lobe: Lobe, tree: u32, indices: &[CellIndex]) {
-        for pair in &mut self.pairs[self.block..] {
-            if pair.lobe() == lobe && pair.tree() == tree {
-                pair.cell = indices[pair.cell as usize];
-            }
-        }
-    }
-
     /// Ends a block.
     pub fn end_block(&mut self) {
-        // Sorting again only when the list has doubled keeps the work per path constant.
-        if self.pairs.len() >= 2 * self.compact {
+        // Only when the list has grown by half: that keeps the work per path constant.
+        if self.pairs.len() >= self.compact + self.compact / 2 {
             self.compact();
         }
-        self.block = self.pairs.len();
     }
 
     /// All pairs and own sums, of blocks that have ended.
     pub fn parts(&mut self) -> (&[Pair], &[(u32, Own)]) {
         self.compact();
-        self.block = self.pairs.len();
         (&self.pairs, &self.own)
     }
 
@@ -203,9 +190,12 @@ impl Pairs {
     }
 
     fn compact(&mut self) {
-        self.pairs.sort_unstable_by_key(Pair::order);
+        self.pairs[self.compact..].sort_unstable_by_key(Pair::order);
+        // The stable sort finds the two sorted runs and merges them.
+        self.pairs.sort_by_key(Pair::order);
         self.pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
         self.compact = self.pairs.len();
+        self.pairs.shrink_to(self.compact + self.compact / 2);
     }
 
     /// Number of pairs.
@@ -219,13 +209,8 @@ impl Pairs {
     }
 
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
-    pub fn resolve(
-        &mut self,
-        quantum: &Quantum,
-        read: impl Fn(Lobe, usize, CellIndex) -> [f32; 3],
-    ) -> Vec<(u32, Resolved)> {
+    pub fn resolve(&mut self, quantum: &Quantum, read: impl Fn(Lobe, usize, u32) -> [f32; 3]) -> Vec<(u32, Resolved)> {
         self.compact();
-        self.block = self.pairs.len();
         // Products are rounded one by one and summed as integers: the order of cells within a slot, which depends on who
         // met them first, does not count.
         let scale = 2f64.powi(RESOLVED_BITS);

@@ -24,6 +24,8 @@ const WEIGHT_BITS: i32 = 16;
 const LARGEST_BITS: i32 = 20;
 /// Largest weight; the smallest is a quantum, so that no deposit vanishes.
 const LARGEST_WEIGHT: f32 = 16.0;
+/// What a cell's own sums stay below.
+const LIMIT: u64 = 1 << 63;
 
 impl Quantum {
     /// For radiance of the order of `unit`, of which only the power of two counts.
@@ -41,21 +43,24 @@ impl Quantum {
     /// above 2²⁰ units: no cell may take it.
     #[inline]
     pub fn deposit(&self, radiance: Vec3, weight: f32) -> Option<Deposit> {
-        let within = radiance.min_element() >= 0.0 && radiance.max_element() <= self.largest;
-        // NaN fails the first comparison or, where another channel wins the minimum, this one.
-        if !within || !radiance.is_finite() || radiance.to_array().iter().any(|x| x.is_subnormal()) {
+        // Comparisons with NaN fail, and infinities are above the largest.
+        let within = |x: f32| (0.0..=self.largest).contains(&x) && (x >= f32::MIN_POSITIVE || x == 0.0);
+        if !(within(radiance.x) && within(radiance.y) && within(radiance.z)) {
             return None;
         }
         const QUANTA: f32 = (1 << WEIGHT_BITS) as f32;
-        let weight = if weight.is_nan() { 1.0 } else { (weight * QUANTA).clamp(1.0, LARGEST_WEIGHT * QUANTA).round() };
-        let share = f64::from(weight / QUANTA);
+        let weight = if weight.is_nan() { 1.0 } else { (weight * QUANTA).clamp(1.0, LARGEST_WEIGHT * QUANTA) + 0.5 };
+        let weight = weight as u32;
+        let share = f64::from(weight as f32 / QUANTA);
         let radiance = radiance.as_dvec3();
         let luminance = radiance.dot(LUMINANCE);
-        let whole = |x: f64| (x + 0.5) as u64;
+        // At most 2²⁰⁺³⁰⁺⁴ quanta: signed conversions are one instruction.
+        let whole = |x: f64| (x + 0.5) as i64 as u64;
+        let square = luminance * luminance * self.square * share + 0.5;
         Some(Deposit {
-            weight: weight as u64,
+            weight: weight.into(),
             rgb: (radiance * (self.rgb * share)).to_array().map(whole),
-            square: (luminance * luminance * self.square * share + 0.5) as u128,
+            square: if square < LIMIT as f64 { (square as i64 as u64).into() } else { square as u128 },
         })
     }
 
@@ -83,7 +88,7 @@ pub struct Deposit {
     square: u128,
 }
 
-/// The sums of a cell, 48 bytes. What does not fit is handed to [`WideSums`].
+/// The sums of a cell, 48 bytes, each below 2⁶³. What does not fit is handed to [`WideSums`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sums {
     /// Deposits.
@@ -114,7 +119,10 @@ impl Sums {
     #[inline]
     #[must_use]
     pub fn add(&mut self, deposit: &Deposit) -> bool {
-        let Ok(square) = u64::try_from(deposit.square) else { return false };
+        if deposit.square >= u128::from(LIMIT) {
+            return false;
+        }
+        let square = deposit.square as u64;
         self.merge(&Self { count: 1, weight: deposit.weight, rgb: deposit.rgb, square })
     }
 
@@ -123,9 +131,9 @@ impl Sums {
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
         let (a, b) = (self.to_array(), other.to_array());
+        // Both below 2⁶³, so nothing wraps, and the top bits say what has grown too large.
         let sum: [u64; 6] = std::array::from_fn(|i| a[i].wrapping_add(b[i]));
-        // A sum that wrapped is less than its terms.
-        if (0..6).any(|i| sum[i] < a[i]) {
+        if sum.iter().fold(0, |bits, x| bits | x) >= LIMIT {
             return false;
         }
         let [count, weight, r, g, b, square] = sum;
@@ -161,8 +169,11 @@ impl TryFrom<&WideSums> for Sums {
     type Error = std::num::TryFromIntError;
 
     fn try_from(wide: &WideSums) -> Result<Self, Self::Error> {
-        let [r, g, b] = wide.rgb.map(u64::try_from);
-        Ok(Self { count: wide.count, weight: wide.weight, rgb: [r?, g?, b?], square: wide.square.try_into()? })
+        // All that fits is below 2⁶³.
+        let narrow = |x: u128| i64::try_from(x).map(|x| x as u64);
+        let [r, g, b] = wide.rgb.map(narrow);
+        let (count, weight) = (narrow(wide.count.into())?, narrow(wide.weight.into())?);
+        Ok(Self { count, weight, rgb: [r?, g?, b?], square: narrow(wide.square)? })
     }
 }
 
