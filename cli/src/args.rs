@@ -88,9 +88,9 @@ pub struct RenderArguments {
     /// The image to write, *.exr. #### or %04d in its name become the frame number
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Frame number for the output's name
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
-    pub frame: i32,
+    /// Number of the frame, for the output's name; the seed is mixed with it [default: 1, and the seed as it is]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub frame: Option<i32>,
 
     /// How good the picture gets.
     #[command(flatten)]
@@ -122,6 +122,9 @@ pub struct QualityArguments {
     /// Seed of the random numbers [default: the scene's]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Do not mix the seed with the frame's number: noise stands still over a sequence
+    #[arg(long)]
+    pub lock_seed: bool,
     /// Stop rendering after this long and write what there is: 90, 90s, 10m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time_limit: Option<Duration>,
@@ -364,7 +367,7 @@ impl FromStr for Resolution {
 }
 
 fn aov_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(AovSet::NAMES.into_iter().chain(["all"]))
+    PossibleValuesParser::new(AovSet::names().chain(["all"]))
 }
 
 fn sample_range(text: &str) -> Result<Range<u64>, String> {

@@ -23,7 +23,7 @@ pub fn output(arguments: &RenderArguments) -> Result<PathBuf, Failure> {
         "exr",
         "a render is written as OpenEXR; \"tessera preview\" makes a PNG of it",
     )?;
-    Ok(named(&arguments.output, arguments.frame))
+    Ok(named(&arguments.output, arguments.frame.unwrap_or(1)))
 }
 
 /// The name of an output of frame `frame`.

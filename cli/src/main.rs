@@ -13,6 +13,7 @@ mod interrupt;
 mod inventory;
 mod job;
 mod log;
+mod metadata;
 mod metric;
 mod output;
 mod picture;

@@ -11,15 +11,14 @@ use std::ops::Range;
 
 use filter::talk::{self, Talk};
 use filter::{Adaptive, Anchor, PathRecord};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 pub use blend::Blend;
 pub use settings::SettingError;
 pub use tile::{Keep, Keeper, Nothing, Paths, Selection};
 
-use crate::film::Film;
+use crate::film::{Film, Layer};
 use crate::math::Rgb;
-use crate::world::World;
 
 /// How a frame is filtered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,6 +70,17 @@ pub enum Report {
     Adaptive(filter::Report),
 }
 
+/// What a filter must know of the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// What cells are measured from.
+    pub anchor: Anchor,
+    /// Radiance of the order of the frame's mean; only its power of two counts.
+    pub unit: f32,
+    /// What turns scene RGB into film RGB.
+    pub response: Mat3,
+}
+
 /// A frame's filter.
 pub struct FrameFilter {
     sharing: Sharing,
@@ -92,31 +102,28 @@ const BLOCK_PATHS: u64 = 1 << 20;
 const BLOCK_SPP: u64 = 64;
 
 impl FrameFilter {
-    /// A filter for `film`, which keeps split sums; `None` if there is to be none. `unit`: radiance of the order of the
-    /// mean.
+    /// A filter for `film`; `None` if there is to be none.
     ///
     /// # Errors
     /// A setting is out of its bounds.
     pub fn new(
         filtering: &Filtering,
-        world: &World,
-        film: &mut Film,
-        unit: f32,
+        surroundings: &Surroundings,
+        film: &Film,
     ) -> Result<Option<Self>, talk::ParamsError> {
-        let (low, high) = world.geometry.bounds();
-        let anchor = Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) };
+        let (anchor, unit) = (&surroundings.anchor, surroundings.unit);
         let pixels = film.bounds().area();
         let block = block_spp(pixels);
         let sharing = match *filtering {
             Filtering::None => return Ok(None),
             Filtering::Talk(params, selection) => {
                 let paths = usize::try_from(pixels * block).unwrap_or(usize::MAX);
-                let talk = Talk::new(&talk::Params { unit, ..params }, &anchor, paths)?;
+                let talk = Talk::new(&talk::Params { unit, ..params }, anchor, paths)?;
                 Sharing::Talk(Box::new(talk), selection)
             }
             Filtering::Adaptive(params, blend) => {
                 let params = filter::Params { unit, ..params };
-                Sharing::Adaptive(Box::new(Adaptive::new(&params, &anchor, film.tiles().len())), blend)
+                Sharing::Adaptive(Box::new(Adaptive::new(&params, anchor, film.tile_count())), blend)
             }
         };
         Ok(Some(Self { sharing, coarse: unit * COARSE, blocks: Blocks { length: block, epoch: filtering.epoch() } }))
@@ -130,9 +137,9 @@ impl FrameFilter {
         }
     }
 
-    /// Cuts a range of samples into blocks.
-    pub fn blocks(&self, range: &Range<u64>) -> impl Iterator<Item = Range<u64>> + use<> {
-        self.blocks.of(range)
+    /// The first of the blocks into which samples `rest` are cut.
+    pub fn block(&self, rest: &Range<u64>) -> Range<u64> {
+        self.blocks.first(rest)
     }
 
     /// Adds the paths of a block, by tile.
@@ -146,15 +153,15 @@ impl FrameFilter {
         }
     }
 
-    /// Gives the film its filtered values.
-    pub fn finish(self, world: &World, film: &mut Film) -> Report {
-        let expose = |radiance: Vec3| world.sensor.response * radiance;
-        match self.sharing {
+    /// Gives the film its filtered values, as of now.
+    pub fn develop(&mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
+        let expose = |radiance: Vec3| surroundings.response * radiance;
+        match &mut self.sharing {
             Sharing::Talk(talk, _) => {
                 let resolved = by_slot(film, talk.resolve());
                 let value = |at| {
                     let sum = resolved[film.index(at)];
-                    let prefix = film.split(at).map_or(glam::DVec3::ZERO, |split| split.prefix);
+                    let prefix = film.layer(Layer::Prefix, at).unwrap_or_default();
                     let sum = prefix + (sum.diffuse + sum.glossy).as_dvec3();
                     expose((sum / film.pixel(at).normalisation()).as_vec3())
                 };
@@ -162,13 +169,13 @@ impl FrameFilter {
                 film.set_filtered(&values);
                 Report::Talk(talk.report())
             }
-            Sharing::Adaptive(mut adaptive, blend) => {
+            Sharing::Adaptive(adaptive, blend) => {
                 let resolved = by_slot(film, adaptive.resolve());
                 let pixel = |at| blend::Pixel::new(film, at, &resolved[film.index(at)], expose);
                 let bounds = film.bounds();
                 let frame =
                     blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
-                let mut values = frame.blend(&blend);
+                let mut values = frame.blend(blend);
                 let coarse = expose(Vec3::splat(self.coarse)).max_element();
                 // At the other end, sums of what fits singly need not fit.
                 let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
@@ -191,15 +198,10 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn of(self, range: &Range<u64>) -> impl Iterator<Item = Range<u64>> + use<> {
-        let (mut next, end) = (range.start, range.end);
-        std::iter::from_fn(move || {
-            let within = next % self.epoch;
-            let most = (self.length - within % self.length).min(self.epoch - within);
-            let block = next..end.min(next.saturating_add(most));
-            next = block.end;
-            (!block.is_empty()).then_some(block)
-        })
+    fn first(self, rest: &Range<u64>) -> Range<u64> {
+        let within = rest.start % self.epoch;
+        let most = (self.length - within % self.length).min(self.epoch - within);
+        rest.start..rest.end.min(rest.start.saturating_add(most))
     }
 }
 
@@ -241,12 +243,18 @@ mod tests {
     #[test]
     fn blocks_of_an_epoch_are_those_of_any_range_of_epochs() {
         for (length, epoch) in [(4, 16), (4, 6), (16, 4), (1, 1), (8, u64::MAX)] {
-            let blocks = Blocks { length, epoch };
-            let whole: Vec<_> = blocks.of(&(0..48)).collect();
+            let blocks = |mut rest: Range<u64>| {
+                std::iter::from_fn(move || {
+                    let block = Blocks { length, epoch }.first(&rest);
+                    rest.start = block.end;
+                    (!block.is_empty()).then_some(block)
+                })
+            };
+            let whole: Vec<_> = blocks(0..48).collect();
             assert!(whole.iter().all(|block| block.start / epoch == (block.end - 1) / epoch), "{whole:?}");
             assert_eq!(whole.iter().map(|block| block.end - block.start).sum::<u64>(), 48);
             for cut in (0..48).step_by(epoch.min(48) as usize) {
-                let parts: Vec<_> = blocks.of(&(0..cut)).chain(blocks.of(&(cut..48))).collect();
+                let parts: Vec<_> = blocks(0..cut).chain(blocks(cut..48)).collect();
                 assert_eq!(parts, whole, "cut at {cut}");
             }
         }

@@ -36,4 +36,5 @@ pub mod compile;
 pub mod integrator;
 pub mod film;
 pub mod filtering;
+pub mod frame;
 pub mod render;

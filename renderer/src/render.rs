@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
+use filter::Anchor;
 use rayon::prelude::*;
 
 use crate::compile::{self, CompileError};
-use crate::film::{AovSet, Film, Tile, TilePixel};
-use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError};
+use crate::film::{self, AovSet, Film, Taken, Tile};
+use crate::filtering::{self, Filtering, Keep, Keeper, Nothing, Paths, SettingError, Surroundings};
+use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
@@ -20,10 +22,14 @@ use crate::world::{Techniques, World};
 pub struct Job {
     /// The scene file.
     pub scene: PathBuf,
-    /// Samples per pixel; `None`: the file's.
+    /// Samples per pixel of the whole frame; `None`: the file's.
     pub spp: Option<u64>,
     /// Seed of all randomness; `None`: the file's.
     pub seed: Option<u64>,
+    /// Number of the frame in a sequence, which the seed is mixed with; `None`: there is no sequence.
+    pub frame: Option<i32>,
+    /// The seed is the same in all frames.
+    pub lock_seed: bool,
     /// Size of the frame; `None`: the file's.
     pub resolution: Option<[u32; 2]>,
     /// Part of the frame, x0 x1 y0 y1 in [0, 1].
@@ -63,7 +69,9 @@ pub trait Observer: Sync {
     fn phase(&self, _phase: Phase) {}
     /// The share of the samples that is done, in [0, 1], monotone.
     fn progress(&self, _done: f64) {}
-    /// Whether to stop: at the end of the pass, so that every pixel has the same samples.
+    /// A pass is done: every pixel has the same samples, and what there is may be stored or looked at.
+    fn pass_done(&self, _frame: &mut Accumulation) {}
+    /// Whether to stop: at the end of the pass.
     fn stop_requested(&self) -> bool {
         false
     }
@@ -112,6 +120,9 @@ pub enum RenderError {
         /// What its sums take.
         bytes: u64,
     },
+    /// More than sums hold.
+    #[error("{0} samples per pixel are more than one job can take, {most}; ask for fewer, or for a sample range", most = film::MOST_TERMS)]
+    TooManySamples(u64),
     /// The filter does not take its settings.
     #[error(transparent)]
     Filter(#[from] SettingError),
@@ -126,39 +137,20 @@ fn count_errors(diagnostics: &[Diagnostic]) -> String {
 
 /// A rendered frame.
 pub struct Frame {
-    /// All sums.
+    /// All sums, and the filtered image.
     pub film: Film,
     /// What was rendered, for the image's metadata.
     pub description: FrameDescription,
+    /// The samples of each pixel that were taken.
+    pub samples: Samples,
     /// What it took.
     pub statistics: Statistics,
 }
 
-/// What of a frame depends on the scene and the job alone.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FrameDescription {
-    /// Seed of all randomness.
-    pub seed: u64,
-    /// The samples of each pixel that were taken.
-    pub sample_range: Range<u64>,
-    /// The samples of each pixel that were asked for.
-    pub sample_range_asked: Range<u64>,
-    /// Hash of the text of the scene's files.
-    pub scene_hash: u64,
-    /// Camera space from world space.
-    pub camera_from_world: glam::DMat4,
-    /// Screen space, normalised to [0, 1]², from world space; `None` for a camera without such a space.
-    pub ndc_from_world: Option<glam::DMat4>,
-    /// The output that the scene names.
-    pub filename: Option<PathBuf>,
-    /// How the frame is filtered.
-    pub filtering: Filtering,
-}
-
-impl FrameDescription {
-    /// Whether all samples were taken.
+impl Frame {
+    /// Whether all samples that were asked for were taken.
     pub fn complete(&self) -> bool {
-        self.sample_range == self.sample_range_asked
+        self.samples.missing(&self.description.asked).is_empty()
     }
 }
 
@@ -195,10 +187,8 @@ pub struct Statistics {
 pub struct Prepared {
     /// The world.
     pub world: World,
-    /// What will be rendered; no sample is taken yet.
+    /// What will be rendered.
     pub description: FrameDescription,
-    /// Auxiliary outputs of the job and of the file.
-    pub aovs: AovSet,
     /// Seconds so far.
     pub statistics: Statistics,
     /// Owns the BVH's memory.
@@ -213,17 +203,15 @@ pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> 
     let pool = thread_pool(job.threads)?;
     let prepared = pool.install(|| prepare(job, observer))?;
     check_memory(&prepared)?;
-    Ok(pool.install(|| trace(prepared, job.time_limit, observer)))
+    Ok(pool.install(|| trace(prepared, None, job.time_limit, observer)))
 }
 
 /// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
-fn check_memory(prepared: &Prepared) -> Result<(), RenderError> {
-    let bounds = prepared.world.sensor.bounds;
-    let filter = match prepared.description.filtering {
-        Filtering::None => 0,
-        _ => Film::filter_memory(bounds) + bounds.area() * size_of::<filter::PathRecord>() as u64,
-    };
-    let bytes = Film::memory(bounds, prepared.aovs) + filter;
+pub fn check_memory(prepared: &Prepared) -> Result<(), RenderError> {
+    let FrameDescription { bounds, aovs, filtering, .. } = &prepared.description;
+    let filtered = *filtering != Filtering::None;
+    let records = if filtered { bounds.area() * size_of::<filter::PathRecord>() as u64 } else { 0 };
+    let bytes = Film::memory(*bounds, *aovs, filtered) + records;
     let fits = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
     if fits { Ok(()) } else { Err(RenderError::Memory { size: [bounds.width(), bounds.height()], bytes }) }
 }
@@ -253,17 +241,21 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     statistics.parse_seconds = start.elapsed().as_secs_f64();
 
     let seed = job.seed.unwrap_or(description.seed);
+    let seed = if job.lock_seed { seed } else { job.frame.map_or(seed, |frame| seed_of_frame(seed, frame)) };
     let spp = job.spp.unwrap_or(description.spp).max(1);
     let asked = job.sample_range.clone().unwrap_or(0..spp);
     let spp = spp.max(asked.end);
     if asked.is_empty() {
         return Err(RenderError::EmptySampleRange(asked));
     }
+    let asked = match asked.end - asked.start {
+        ..=film::MOST_TERMS => asked,
+        // As many as time allows, which is not so many.
+        _ if job.time_limit.is_some() => asked.start..asked.start + film::MOST_TERMS,
+        count => return Err(RenderError::TooManySamples(count)),
+    };
     job.filtering.validate()?;
-    let mut aovs = job.aovs;
-    if description.film.gbuffer {
-        aovs = AovSet::all();
-    }
+    let aovs = if description.film.gbuffer { AovSet::all() } else { job.aovs };
 
     observer.phase(Phase::Compile);
     let start = Instant::now();
@@ -279,123 +271,128 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
     let ours_from_world = glam::DMat4::from_translation(-world.origin);
-    let description = FrameDescription {
+    let (low, high) = world.geometry.bounds();
+    let mut description = FrameDescription {
+        number: job.frame.unwrap_or(1),
         seed,
-        sample_range: asked.start..asked.start,
-        sample_range_asked: asked,
+        spp,
+        asked,
         scene_hash: description.sources.hash(),
+        resolution: world.sensor.resolution,
+        bounds: world.sensor.bounds,
+        aovs,
+        filtering: job.filtering.settled(spp),
+        surroundings: Surroundings {
+            anchor: Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) },
+            unit: 1.0,
+            response: world.sensor.response,
+        },
         camera_from_world: description.camera.world_from_camera.inverse().matrix() * ours_from_world,
         ndc_from_world: world.camera.ndc_from_world().map(|ndc_from_ours| ndc_from_ours * ours_from_world),
         filename: description.film.filename.clone(),
-        filtering: job.filtering.settled(spp),
     };
-    Ok(Prepared { world, description, aovs, statistics, device })
+    if description.filtering != Filtering::None {
+        description.surroundings.unit = match world.geometry.alpha_test(&world.textures) {
+            None => unit(&world, &Opaque(world.geometry.scene()), seed),
+            Some(alpha) => unit(&world, &AlphaTested { scene: world.geometry.scene(), alpha }, seed),
+        };
+    }
+    Ok(Prepared { world, description, statistics, device })
 }
 
-/// Traces all passes of a prepared job.
-pub fn trace(prepared: Prepared, time_limit: Option<Duration>, observer: &dyn Observer) -> Frame {
+/// The seed of one frame of a sequence.
+///
+/// **Source**: the finaliser of SplitMix64 \[Steele14\].
+fn seed_of_frame(seed: u64, frame: i32) -> u64 {
+    let mut bits = (i64::from(frame) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    seed ^ bits ^ bits >> 31
+}
+
+/// Traces all passes of a prepared job that `begun` does not hold yet.
+///
+/// # Panics
+/// If `begun` is another frame.
+pub fn trace(
+    prepared: Prepared,
+    begun: Option<Accumulation>,
+    time_limit: Option<Duration>,
+    observer: &dyn Observer,
+) -> Frame {
     observer.phase(Phase::Render);
     let start = Instant::now();
+    let mut frame = begun.unwrap_or_else(|| Accumulation::new(prepared.description.clone()));
+    assert_eq!(frame.description.difference(&prepared.description), None, "another frame was begun");
+    frame.description = prepared.description;
     let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
-    let mut frame = match prepared.world.geometry.alpha_test(&prepared.world.textures) {
-        None => trace_queries(&prepared, &Opaque(prepared.world.geometry.scene()), observer, &over),
+    let Prepared { world, mut statistics, .. } = prepared;
+    statistics.film_bytes = frame.film_bytes();
+    match world.geometry.alpha_test(&world.textures) {
+        None => trace_passes(&world, &Opaque(world.geometry.scene()), &mut frame, &mut statistics, observer, &over),
         Some(alpha) => {
-            let queries = AlphaTested { scene: prepared.world.geometry.scene(), alpha };
-            trace_queries(&prepared, &queries, observer, &over)
+            let queries = AlphaTested { scene: world.geometry.scene(), alpha };
+            trace_passes(&world, &queries, &mut frame, &mut statistics, observer, &over);
         }
-    };
-    frame.statistics.render_seconds = start.elapsed().as_secs_f64();
-    frame
+    }
+    let filtering = Instant::now();
+    statistics.filter = frame.develop();
+    statistics.filter_seconds += filtering.elapsed().as_secs_f64();
+    statistics.counters = frame.counters;
+    statistics.render_seconds = start.elapsed().as_secs_f64();
+    Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
 }
 
 /// Traces all passes, filtered or not.
-fn trace_queries<Q: Queries + Sync>(
-    prepared: &Prepared,
+fn trace_passes<Q: Queries + Sync>(
+    world: &World,
     queries: &Q,
+    frame: &mut Accumulation,
+    statistics: &mut Statistics,
     observer: &dyn Observer,
     over: &dyn Fn() -> bool,
-) -> Frame {
-    let Prepared { world, description, aovs, statistics, .. } = prepared;
-    let (mut description, mut statistics) = (description.clone(), statistics.clone());
-    let film = Film::new(world.sensor.resolution, world.sensor.bounds, *aovs);
-    statistics.film_bytes = Film::memory(film.bounds(), *aovs);
-    let asked = description.sample_range_asked.clone();
-    let progress = Progress::new(&film, &asked, observer);
-    let mut passes = Passes { world, queries, sampler: Sampler::new(description.seed), film, progress };
-    let filter = passes.filter(&description.filtering);
-    let mut done = |pass: &Range<u64>, counters: Counters| {
-        statistics.counters += counters;
-        statistics.passes += 1;
-        description.sample_range.end = pass.end;
-        over()
-    };
-    match filter {
-        None => {
-            for pass in self::passes(&asked) {
-                let (counters, _) = passes.trace(&pass, || Nothing);
-                if done(&pass, counters) {
-                    break;
-                }
-            }
-        }
-        Some(mut filter) => {
-            let (selection, mut filtering) = (filter.selection(), Duration::ZERO);
-            for pass in filter.blocks(&asked) {
-                let (counters, paths) = passes.trace(&pass, || Paths::new(selection));
+) {
+    let mut rest = frame.samples.missing(&frame.description.asked);
+    let progress = Progress::new(&frame.film, &frame.description.asked, rest.start, observer);
+    let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), progress };
+    while !rest.is_empty() && (frame.samples.count() == 0 || !over()) {
+        let pass = frame.pass(&rest);
+        rest.start = pass.end;
+        frame.counters += match &mut frame.filter {
+            None => passes.trace(&pass, &mut frame.film, || Nothing).0,
+            Some(filter) => {
+                let selection = filter.selection();
+                let (counters, paths) = passes.trace(&pass, &mut frame.film, || Paths::new(selection));
                 let start = Instant::now();
                 filter.add(&pass, &paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
-                filtering += start.elapsed();
-                if done(&pass, counters) {
-                    break;
-                }
+                statistics.filter_seconds += start.elapsed().as_secs_f64();
+                counters
             }
-            let start = Instant::now();
-            statistics.filter = Some(filter.finish(world, &mut passes.film));
-            statistics.filter_seconds = (filtering + start.elapsed()).as_secs_f64();
-        }
+        };
+        frame.samples.insert(pass).expect("passes do not overlap");
+        statistics.passes += 1;
+        observer.pass_done(frame);
     }
-    Frame { film: passes.film, description, statistics }
 }
-
-/// Cuts a range of samples into passes over the whole frame: short ones first, so that a job that is stopped early has
-/// something, then of [`PASS_SPP`], so that the threads seldom wait for each other.
-pub fn passes(range: &Range<u64>) -> impl Iterator<Item = Range<u64>> + use<> {
-    let (mut next, end, mut length) = (range.start, range.end, 1);
-    std::iter::from_fn(move || {
-        let pass = next..end.min(next.saturating_add(length));
-        next = pass.end;
-        length = (2 * length).min(PASS_SPP);
-        (!pass.is_empty()).then_some(pass)
-    })
-}
-
-/// The longest pass, in samples per pixel.
-const PASS_SPP: u64 = 16;
 
 /// All that a pass over the frame needs.
 struct Passes<'a, Q> {
     world: &'a World,
     queries: &'a Q,
     sampler: Sampler,
-    film: Film,
     progress: Progress<'a>,
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
-    /// The filter, and what the film must keep for it.
-    fn filter(&mut self, filtering: &Filtering) -> Option<FrameFilter> {
-        if *filtering == Filtering::None {
-            return None;
-        }
-        let unit = self.unit();
-        self.film.keep_split();
-        FrameFilter::new(filtering, self.world, &mut self.film, unit).expect("`prepare` has checked the settings")
-    }
-
     /// Traces samples `pass` of every pixel; what was kept of them, by tile.
-    fn trace<K: Keeper>(&mut self, pass: &Range<u64>, keeper: impl Fn() -> K + Sync) -> (Counters, Vec<K>) {
-        let first_hit = self.film.aovs().first_hit();
-        let mut tiles = self.film.tiles();
+    fn trace<K: Keeper>(
+        &self,
+        pass: &Range<u64>,
+        film: &mut Film,
+        keeper: impl Fn() -> K + Sync,
+    ) -> (Counters, Vec<K>) {
+        let first_hit = film.first_hit();
+        let mut tiles = film.tiles();
         let traced: Vec<(Counters, K)> = tiles
             .par_iter_mut()
             .map(|tile| {
@@ -413,30 +410,30 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
         let kept = kept.collect();
         (sum, kept)
     }
+}
 
-    /// Radiance of the order of the frame's mean, from a few paths all over it: the same for every part of the frame's
-    /// samples.
-    fn unit(&self) -> f32 {
-        let [width, height] = self.world.sensor.resolution;
-        let (mut sum, mut lit) = (0.0, 0.0);
-        for k in 0..PILOT_PATHS {
-            // Rows and columns by two numbers without common structure.
-            let at = self.sampler.pixel_sample([0, 0], k).d2(Dimension::FILM);
-            let pixel = [(at.x * width as f32) as u32, (at.y * height as f32) as u32];
-            let numbers = self.sampler.pixel_sample(pixel, u64::MAX - k);
-            let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
-            let Some(camera) = self.world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
-            let counters = &mut Counters::default();
-            let sample =
-                integrator::trace(self.world, self.queries, &camera, &numbers, false, &mut Unrecorded, counters);
-            let radiance = f64::from(sample.radiance.element_sum() / 3.0);
-            if radiance > 0.0 && radiance.is_finite() {
-                sum += radiance;
-                lit += 1.0;
-            }
+/// Radiance of the order of the frame's mean, from a few paths all over it: the same for every part of the frame's
+/// samples.
+fn unit<Q: Queries>(world: &World, queries: &Q, seed: u64) -> f32 {
+    let sampler = Sampler::new(seed);
+    let [width, height] = world.sensor.resolution;
+    let (mut sum, mut lit) = (0.0, 0.0);
+    for k in 0..PILOT_PATHS {
+        // Rows and columns by two numbers without common structure.
+        let at = sampler.pixel_sample([0, 0], k).d2(Dimension::FILM);
+        let pixel = [(at.x * width as f32) as u32, (at.y * height as f32) as u32];
+        let numbers = sampler.pixel_sample(pixel, u64::MAX - k);
+        let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
+        let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
+        let counters = &mut Counters::default();
+        let sample = integrator::trace(world, queries, &camera, &numbers, false, &mut Unrecorded, counters);
+        let radiance = f64::from(sample.radiance.element_sum() / 3.0);
+        if radiance > 0.0 && radiance.is_finite() {
+            sum += radiance;
+            lit += 1.0;
         }
-        if lit > 0.0 { (sum / lit) as f32 } else { 1.0 }
     }
+    if lit > 0.0 { (sum / lit) as f32 } else { 1.0 }
 }
 
 /// Paths that find the order of the frame's radiance, of which a power of two matters.
@@ -453,34 +450,32 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
     keeper: &mut K,
 ) -> Counters {
     let mut counters = Counters::default();
-    tile.for_each(|TilePixel { at: [x, y], index: slot, pixel, mut auxiliary, mut split }| {
+    tile.for_each(|mut pixel| {
+        let [x, y] = pixel.at;
         for index in pass.clone() {
             let numbers = sampler.pixel_sample([x, y], index);
             let offset = world.filter.sample(numbers.d2(Dimension::FILM));
             let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
             let mut recorder = keeper.recorder();
             let camera = world.camera.ray(film_point, numbers.d2(Dimension::LENS));
-            let mut sample = camera.map_or_else(Sample::default, |camera| {
+            let sample = camera.map_or_else(Sample::default, |camera| {
                 integrator::trace(world, queries, &camera, &numbers, first_hit, &mut recorder, &mut counters)
             });
             if camera.is_none() {
                 counters.camera_rays += 1;
             }
-            let (mut exposed, mut exposure) = world.sensor.expose(sample.radiance);
+            let mut found = sample.radiance;
+            let (mut radiance, mut exposure) = world.sensor.expose(found);
             // A sensor's response may leave its gamut: negative is rejected only as radiance.
-            if !exposed.is_finite() || sample.radiance.min_element() < 0.0 {
+            if !radiance.is_finite() || found.min_element() < 0.0 {
                 counters.rejected_samples += 1;
-                (exposed, exposure) = (glam::Vec3::ZERO, 0.0);
+                (found, radiance, exposure) = (glam::Vec3::ZERO, glam::Vec3::ZERO, 0.0);
                 recorder = keeper.recorder();
-                sample.radiance = exposed;
             }
-            pixel.add(exposed, sample.alpha, offset.weight);
-            let split = split.as_deref_mut();
-            let radiance = sample.radiance;
-            keeper.keep(&recorder, Keep { slot, index, radiance, exposed, weight: offset.weight, exposure, split });
-            if let Some(auxiliary) = auxiliary.as_deref_mut().filter(|_| sample.alpha > 0.0) {
-                auxiliary.add(&sample.first);
-            }
+            let weight = offset.weight;
+            let kept = Keep { slot: pixel.index, index, radiance: found, weight: weight * exposure };
+            let prefix = keeper.keep(&recorder, kept) * exposure;
+            pixel.add(&Taken { index, radiance, alpha: sample.alpha, weight, prefix, first: &sample.first });
         }
     });
     counters
@@ -496,9 +491,12 @@ struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    fn new(film: &Film, samples: &Range<u64>, observer: &'a dyn Observer) -> Self {
-        let total = film.bounds().area() as f64 * (samples.end - samples.start) as f64;
-        let (done, told_permille, telling) = Default::default();
+    /// Of `samples`, of which those before `next` are done.
+    fn new(film: &Film, samples: &Range<u64>, next: u64, observer: &'a dyn Observer) -> Self {
+        let pixels = film.bounds().area();
+        let total = pixels as f64 * (samples.end - samples.start) as f64;
+        let done = AtomicU64::new(pixels.saturating_mul(next - samples.start));
+        let (told_permille, telling) = Default::default();
         Self { observer, total, done, told_permille, telling }
     }
 
@@ -536,15 +534,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn passes_cover_the_range_once_and_in_order() {
-        for range in [0..1, 0..100, 7..9, u64::MAX - 40..u64::MAX] {
-            let mut next = range.start;
-            for pass in passes(&range) {
-                assert_eq!(pass.start, next);
-                assert!(pass.end - pass.start <= PASS_SPP && !pass.is_empty());
-                next = pass.end;
-            }
-            assert_eq!(next, range.end);
-        }
+    fn seeds_of_frames_differ() {
+        let mut seeds: Vec<u64> = (-500..500).map(|frame| seed_of_frame(7, frame)).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), 1000);
     }
 }

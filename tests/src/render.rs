@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use renderer::film::Film;
+use renderer::film::{Aov, AovSet, Film, Layer};
 use renderer::render::{Frame, Job, RenderError, Unobserved, render};
 
 use crate::image::RgbImage;
@@ -17,7 +17,7 @@ pub fn own_scene(name: &str) -> PathBuf {
 /// # Panics
 /// If the scene cannot be rendered, with every message of it.
 pub fn quick(scene: &Path, spp: u64, resolution: Option<[u32; 2]>) -> Frame {
-    run(&Job { scene: scene.to_owned(), spp: Some(spp), resolution, ..Job::default() })
+    with_variance(&Job { scene: scene.to_owned(), spp: Some(spp), resolution, ..Job::default() })
 }
 
 /// Renders an own scene with some of its text replaced.
@@ -42,6 +42,14 @@ pub fn altered(name: &str, replacements: &[(&str, &str)], spp: u64) -> Frame {
 /// As [`quick`].
 pub fn run(job: &Job) -> Frame {
     render(job, &Unobserved).unwrap_or_else(|error| panic!("{}", describe(&error)))
+}
+
+/// Renders `job` with what [`mean_and_error`] needs.
+///
+/// # Panics
+/// As [`quick`].
+pub fn with_variance(job: &Job) -> Frame {
+    run(&Job { aovs: AovSet::from_iter([Aov::Variance]), ..job.clone() })
 }
 
 /// An error with all its messages.
@@ -70,6 +78,9 @@ pub fn pixels(film: &Film) -> RgbImage {
 /// Mean over the film and the standard error of that mean, both of the green channel.
 ///
 /// The error is that of independent samples; stratified ones do better, so a test with it is on the safe side.
+///
+/// # Panics
+/// If the film was rendered without variances.
 pub fn mean_and_error(film: &Film) -> (f64, f64) {
     let bounds = film.bounds();
     let (mut mean, mut variance, mut pixels) = (0.0, 0.0, 0.0);
@@ -77,9 +88,18 @@ pub fn mean_and_error(film: &Film) -> (f64, f64) {
         for x in bounds.min[0]..bounds.max[0] {
             let pixel = film.pixel([x, y]);
             mean += pixel.mean().y;
-            variance += pixel.sample_variance().y / pixel.count.max(1) as f64;
+            variance += variance_of_mean(film, [x, y]);
             pixels += 1.0;
         }
     }
     (mean / pixels, variance.sqrt() / pixels)
+}
+
+/// Variance of a pixel's mean as if its samples were independent, of the green channel.
+///
+/// # Panics
+/// If the film was rendered without variances.
+pub fn variance_of_mean(film: &Film, at: [u32; 2]) -> f64 {
+    let (pixel, squares) = (film.pixel(at), film.layer(Layer::Squares, at).expect("a film with variances"));
+    pixel.sample_variance(squares).y / pixel.count().max(1) as f64
 }

@@ -3,15 +3,14 @@
 
 use renderer::render::Job;
 use renderer::world::Techniques;
-use tests::render::{mean_and_error, own_scene, run};
+use tests::render::{mean_and_error, own_scene, with_variance};
 
 /// As in the furnace test.
 const Z: f64 = 4.4;
 
 fn value(scene: &str, techniques: Techniques) -> (f64, f64) {
     let job = Job { scene: own_scene(scene), techniques, ..Job::default() };
-    let frame = run(&job);
-    mean_and_error(&frame.film)
+    mean_and_error(&with_variance(&job).film)
 }
 
 fn check(scene: &str, techniques: Techniques, expected: f64) {

@@ -224,7 +224,7 @@ fn variances_of_cells_are_those_that_are_predicted() {
         let queries = Opaque(world.geometry.scene());
         let mut cells: HashMap<[i32; 5], Vec<Moments>> = HashMap::new();
         for seed in 0..SEEDS {
-            let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default());
+            let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default(), false);
             let sampler = Sampler::new(seed);
             for tile in &mut film.tiles() {
                 let mut paths = Paths::default();
@@ -289,9 +289,8 @@ fn noise_of_pixels_is_what_their_halves_say() {
                 let job = Job { spp: Some(spp), seed: Some(seed), filtering: adaptive(), ..Job::default() };
                 let film = scene.render(job).film;
                 for (i, at) in film.bounds().pixels().enumerate() {
-                    let (pixel, split) = (film.pixel(at), film.split(at).expect("a filtered film"));
-                    let even = (pixel.sum.y - split.odd.y) / (pixel.weight - split.odd_weight);
-                    predicted[i] += (0.5 * (even - split.odd.y / split.odd_weight)).powi(2) / SEEDS as f64;
+                    let [even, odd] = film.pixel(at).halves().expect("more than one sample").map(|half| half.y);
+                    predicted[i] += (0.5 * (even - odd)).powi(2) / SEEDS as f64;
                 }
                 images.push(film.bounds().pixels().map(|at| film.pixel(at).mean().y).collect::<Vec<f64>>());
             }

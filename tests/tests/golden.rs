@@ -6,7 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use renderer::film::{self, AovSet};
+use renderer::film::{self, Aov, AovSet};
 use renderer::render::Job;
 use tests::render::{own_scene, run};
 
@@ -42,7 +42,7 @@ fn read(path: &Path) -> Golden {
 fn golden(scene: &str, spp: u64) {
     let name = Path::new(scene).file_stem().unwrap().to_string_lossy().into_owned();
     let reference: PathBuf = own_scene("golden").join(format!("{name}.exr"));
-    let aovs = AovSet { variance: true, sample_count: true, ..AovSet::default() };
+    let aovs = AovSet::from_iter([Aov::Variance, Aov::SampleCount]);
     let job = |seed, spp| Job { scene: own_scene(scene), seed: Some(seed), spp: Some(spp), aovs, ..Job::default() };
     if std::env::var_os("TESSERA_BLESS").is_some() {
         // Another seed, so that picture and test are independent.

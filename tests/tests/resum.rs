@@ -6,6 +6,7 @@ use std::path::Path;
 use renderer::film::{AovSet, Film};
 use renderer::filtering::{Filtering, Keep, Keeper, Paths, Selection};
 use renderer::integrator::{AlphaTested, Cut, Opaque, Queries};
+use renderer::math::Rgb;
 use renderer::render::{Job, Prepared, Unobserved, prepare, trace_tile};
 use renderer::sampling::Sampler;
 use tests::render::{own_scene, run};
@@ -30,12 +31,11 @@ impl Keeper for Resum {
         Paths::new(self.selection).recorder()
     }
 
-    fn keep(&mut self, cut: &Cut, sample: Keep<'_>) {
-        let weight = sample.weight * sample.exposure;
-        let whole = sample.radiance * weight;
+    fn keep(&mut self, cut: &Cut, sample: Keep) -> Rgb {
+        let whole = sample.radiance * sample.weight;
         let mut paths = Paths::default();
-        paths.keep(cut, Keep { split: None, ..sample });
-        let pieces = paths.records.iter().fold(cut.prefix() * weight, |sum, record| sum + record.unfiltered());
+        let prefix = paths.keep(cut, sample);
+        let pieces = paths.records.iter().fold(prefix * sample.weight, |sum, record| sum + record.unfiltered());
         let difference = (pieces - whole).abs().max_element() / whole.abs().max_element().max(f32::MIN_POSITIVE);
         self.paths += 1;
         self.recorded += paths.records.len() as u64;
@@ -44,6 +44,7 @@ impl Keeper for Resum {
             self.worst = difference;
             self.example = format!("{pieces} instead of {whole}: {cut:?}");
         }
+        prefix
     }
 }
 
@@ -54,7 +55,7 @@ const BOUND: f32 = 2.0 * 4.0 / (1 << 17) as f32;
 
 fn trace<Q: Queries>(prepared: &Prepared, queries: &Q, selection: Selection) -> Resum {
     let world = &prepared.world;
-    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default());
+    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default(), false);
     let mut resum = Resum { selection, ..Resum::default() };
     for tile in &mut film.tiles() {
         trace_tile(world, queries, tile, &(0..8), &Sampler::new(1), false, &mut resum);

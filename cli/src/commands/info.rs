@@ -100,7 +100,7 @@ fn build(arguments: &InfoArguments) -> Result<(Built, Vec<Diagnostic>), RenderEr
     let observer = Warnings::default();
     let prepared = render::thread_pool(threads)?.install(|| render::prepare(&job, &observer))?;
     let bounds = prepared.world.sensor.bounds;
-    let film_bytes = Film::memory(bounds, prepared.aovs);
+    let film_bytes = Film::memory(bounds, prepared.description.aovs, false);
     let statistics = &prepared.statistics;
     let total_bytes = stats::resident_memory().zip(stats::peak_memory());
     let built = Built {
@@ -133,6 +133,7 @@ fn failure(error: &RenderError, log: &Log) -> Failure {
         | RenderError::Threads { .. }
         | RenderError::Memory { .. }
         | RenderError::EmptySampleRange(_)
+        | RenderError::TooManySamples(_)
         | RenderError::Filter(_) => Failure::Render(error.to_string()),
     }
 }

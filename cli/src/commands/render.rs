@@ -2,9 +2,8 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
-use oiio::Attribute;
 use renderer::film::AovSet;
 use renderer::film::exr::{self, Losses};
 use renderer::filtering::Filtering;
@@ -16,6 +15,7 @@ use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::job;
 use crate::log::Log;
+use crate::metadata;
 use crate::output::OutputFile;
 use crate::progress::Progress;
 use crate::stats::{self, Filter, Memory, Primitives, Problems, Rays, Seconds, Stats};
@@ -34,7 +34,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     let filtering = job::filtering(&arguments.filter)?;
     let path = job::output(arguments)?;
     let output = OutputFile::prepare(&path)?;
-    let stats_path = arguments.channels.stats.as_deref().map(|path| job::named(path, arguments.frame));
+    let stats_path = arguments.channels.stats.as_deref().map(|path| job::named(path, arguments.frame.unwrap_or(1)));
     let stats_file = stats_path.as_deref().map(OutputFile::prepare).transpose()?;
 
     let job = job(arguments, filtering);
@@ -48,7 +48,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     progress.phase("write");
     let start = Instant::now();
     library_threads(job.threads, log);
-    let losses = exr::write(&frame.film, attributes(arguments, &frame), output.target())
+    let losses = exr::write(&frame.film, metadata::of_frame(&frame, arguments.channels.provenance), output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     let outcome = Outcome { path: &path, losses, write_seconds: start.elapsed().as_secs_f64() };
 
@@ -79,6 +79,8 @@ fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
         scene: arguments.scene.clone(),
         spp: arguments.quality.spp,
         seed: arguments.quality.seed,
+        frame: arguments.frame,
+        lock_seed: arguments.quality.lock_seed,
         resolution: arguments.frame_area.resolution.map(|size| size.0),
         crop: arguments.frame_area.crop,
         pixel_bounds: arguments.frame_area.pixel_bounds,
@@ -160,83 +162,14 @@ impl Reporter<'_> {
                 }
                 Failure::Input(summary)
             }
-            RenderError::EmptySampleRange(_) | RenderError::Filter(_) => Failure::Usage(summary),
+            RenderError::EmptySampleRange(_) | RenderError::TooManySamples(_) | RenderError::Filter(_) => {
+                Failure::Usage(summary)
+            }
             RenderError::Embree(_)
             | RenderError::OpenImageIo(_)
             | RenderError::Threads { .. }
             | RenderError::Memory { .. } => Failure::Render(summary),
         }
-    }
-}
-
-/// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
-/// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
-fn attributes(arguments: &RenderArguments, frame: &Frame) -> Vec<(String, Attribute)> {
-    let description = &frame.description;
-    let samples = &description.sample_range;
-    let text = |text: String| Attribute::Text(text);
-    let mut attributes = vec![
-        ("Software".into(), text(job::software())),
-        ("DateTime".into(), text(job::date(std::env::var("SOURCE_DATE_EPOCH").ok().as_deref()))),
-        ("chromaticities".into(), Attribute::Floats(REC709.into())),
-        ("worldtocamera".into(), Attribute::Matrix(description.camera_from_world.as_mat4().to_cols_array())),
-        ("samplesPerPixel".into(), Attribute::Int(i32::try_from(samples.end - samples.start).unwrap_or(i32::MAX))),
-        ("tessera/version".into(), text(env!("CARGO_PKG_VERSION").into())),
-        ("tessera/integrator".into(), text("path".into())),
-        ("tessera/seed".into(), text(description.seed.to_string())),
-        ("tessera/frame".into(), Attribute::Int(arguments.frame)),
-        ("tessera/sampleRange".into(), text(format!("{}:{}", samples.start, samples.end))),
-        ("tessera/filter".into(), text(filter_settings(&description.filtering))),
-        ("tessera/complete".into(), Attribute::Int(description.complete().into())),
-        ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
-        ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(frame)))),
-    ];
-    if let Some(ndc_from_world) = description.ndc_from_world {
-        let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
-        attributes.push(("worldtoNDC".into(), matrix));
-    }
-    if arguments.channels.provenance {
-        add_provenance(&mut attributes, frame);
-    }
-    attributes
-}
-
-/// Chromaticities of red, green, blue and white: ITU-R BT.709.
-const REC709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
-
-/// A filter as the image's metadata name it: its name and all its settings.
-fn filter_settings(filtering: &Filtering) -> String {
-    let settings = filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
-    filtering.name().to_owned() + &settings.collect::<String>()
-}
-
-/// What two files must share, besides the scene, for their samples to belong to one picture: not the sample range.
-fn settings_hash(frame: &Frame) -> u64 {
-    let (film, bounds) = (&frame.film, frame.film.bounds());
-    let settings = format!(
-        "{} seed {} resolution {:?} pixels {:?} {:?} channels {:?} filter {}",
-        env!("CARGO_PKG_VERSION"),
-        frame.description.seed,
-        film.resolution(),
-        bounds.min,
-        bounds.max,
-        film.aovs(),
-        filter_settings(&frame.description.filtering),
-    );
-    job::hash(settings.as_bytes())
-}
-
-fn add_provenance(attributes: &mut Vec<(String, Attribute)>, frame: &Frame) {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-    attributes.retain(|(name, _)| name != "DateTime");
-    attributes.push(("DateTime".into(), Attribute::Text(job::exif_date(now))));
-    if let Ok(host) = std::fs::read_to_string("/proc/sys/kernel/hostname") {
-        attributes.push(("HostComputer".into(), Attribute::Text(host.trim().into())));
-    }
-    attributes.push(("renderTimeSeconds".into(), Attribute::Float(frame.statistics.render_seconds as f32)));
-    attributes.push(("tessera/threads".into(), Attribute::Int(frame.statistics.threads as i32)));
-    if let Some(bytes) = stats::peak_memory() {
-        attributes.push(("tessera/peakRSS".into(), Attribute::Text(bytes.to_string())));
     }
 }
 
@@ -258,11 +191,11 @@ impl<'a> Outcome<'a> {
             version: env!("CARGO_PKG_VERSION"),
             scene: &arguments.scene,
             output: self.path,
-            frame: arguments.frame,
-            complete: description.complete(),
+            frame: description.number,
+            complete: frame.complete(),
             resolution: film.resolution(),
             pixel_bounds: [x0, x1, y0, y1],
-            samples: [description.sample_range.start, description.sample_range.end],
+            samples: metadata::span(&frame.samples),
             seed: description.seed,
             threads: statistics.threads,
             seconds: Seconds {
@@ -298,7 +231,7 @@ impl<'a> Outcome<'a> {
 /// Sums up for people.
 fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
     let [start, end] = stats.samples;
-    let asked = &frame.description.sample_range_asked;
+    let asked = &frame.description.asked;
     if !stats.complete {
         log.warning(&format!(
             "stopped early: {} of {} samples per pixel were taken",

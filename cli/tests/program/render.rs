@@ -213,7 +213,7 @@ fn a_time_limit_ends_a_long_render_early_and_says_so() {
 fn interrupt(bench: &Bench, signal: &str) -> Run {
     use std::io::{BufRead, BufReader, Read};
     use std::process::{Command, Stdio};
-    let arguments = ["render", "scene.pbrt", "-o", "a.exr", "--spp", "100000000", "--progress", "alf"];
+    let arguments = ["render", "scene.pbrt", "-o", "a.exr", "--spp", "8000000", "--progress", "alf"];
     let mut command = bench.command(&arguments);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut stdout = BufReader::new(child.stdout.take().unwrap());

@@ -102,8 +102,9 @@ pub fn publish(part: &Path, path: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AovSet, TilePixel};
+    use super::super::{Aov, AovSet, Taken};
     use super::*;
+    use crate::integrator::FirstHit;
     use crate::math::Rgb;
     use crate::world::Bounds;
 
@@ -112,9 +113,12 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         let bounds = Bounds { min: [2, 1], max: [5, 3] };
-        let mut film = Film::new([8, 4], bounds, AovSet { sample_count: true, ..AovSet::default() });
-        film.tiles()[0]
-            .for_each(|TilePixel { at: [x, y], pixel, .. }| pixel.add(Rgb::new(x as f32, y as f32, 0.25), 1.0, 1.0));
+        let mut film = Film::new([8, 4], bounds, AovSet::from_iter([Aov::SampleCount]), false);
+        film.tiles()[0].for_each(|mut pixel| {
+            let radiance = Rgb::new(pixel.at[0] as f32, pixel.at[1] as f32, 0.25);
+            let first = &FirstHit::NOTHING;
+            pixel.add(&Taken { index: 0, radiance, alpha: 1.0, weight: 1.0, prefix: Rgb::ZERO, first });
+        });
         let attributes = vec![("tessera/seed".to_owned(), Attribute::Text("7".into()))];
         write(&film, attributes.clone(), &path).unwrap();
         let image = oiio::read(&path).unwrap();
@@ -130,7 +134,7 @@ mod tests {
 
     #[test]
     fn an_absent_folder_is_an_error_that_names_the_file() {
-        let film = Film::new([1, 1], Bounds::full([1, 1]), AovSet::default());
+        let film = Film::new([1, 1], Bounds::full([1, 1]), AovSet::default(), false);
         let error = write(&film, Vec::new(), Path::new("/nonexistent/folder/a.exr")).unwrap_err().to_string();
         assert!(error.contains("/nonexistent/folder/a.exr"), "{error}");
     }

@@ -1,6 +1,6 @@
 //! The image that a film shows.
 
-use super::Film;
+use super::{Aov, Film};
 use crate::math::Rgb;
 
 /// One channel of an image.
@@ -37,51 +37,30 @@ impl Film {
     }
 
     fn channels(&self) -> Vec<Channel> {
-        let aovs = self.aovs();
-        let mut channels: Vec<Channel> =
-            ["R", "G", "B", "A"].map(|name| Channel { name: name.into(), float: false }).into();
-        let mut add = |wanted: bool, names: &[&str]| {
-            if wanted {
-                channels.extend(names.iter().map(|name| Channel { name: (*name).into(), float: true }));
-            }
-        };
-        add(aovs.albedo, &["albedo.R", "albedo.G", "albedo.B"]);
-        add(aovs.normal, &["N.X", "N.Y", "N.Z"]);
-        add(aovs.geometric_normal, &["Ng.X", "Ng.Y", "Ng.Z"]);
-        add(aovs.position, &["P.X", "P.Y", "P.Z"]);
-        add(aovs.depth, &["depth.Z"]);
-        add(aovs.variance, &["variance.R", "variance.G", "variance.B"]);
-        add(aovs.sample_count, &["sampleCount"]);
-        channels
+        let channel = |name: &&str, float| Channel { name: (*name).into(), float };
+        let radiance = ["R", "G", "B", "A"].iter().map(|name| channel(name, false));
+        radiance.chain(self.aovs().iter().flat_map(Aov::channels).map(|name| channel(name, true))).collect()
     }
 
     fn push_auxiliary(&self, at: [u32; 2], values: &mut Vec<f32>) {
-        let (aovs, pixel) = (self.aovs(), self.pixel(at));
-        if let Some(sums) = self.auxiliary(at) {
-            // Albedo and normals fade to zero where nothing is seen, as denoisers expect. A position or a distance
-            // must not: it is the mean over the samples that have one.
-            let all = 1.0 / pixel.count.max(1) as f64;
-            let hits = 1.0 / sums.hits.max(1) as f64;
-            let vectors = [
-                (aovs.albedo, sums.albedo * all),
-                (aovs.normal, sums.ns * all),
-                (aovs.geometric_normal, sums.ng * all),
-                (aovs.position, sums.p * hits),
-            ];
-            for (_, vector) in vectors.iter().filter(|(wanted, _)| *wanted) {
-                values.extend(vector.as_vec3().to_array());
+        let pixel = self.pixel(at);
+        // Albedo and normals fade to zero where nothing is seen, as denoisers expect. A position or a distance must not: it
+        // is the mean over the samples that have one.
+        let (all, hits) = (1.0 / pixel.count().max(1) as f64, 1.0 / pixel.hits().max(1) as f64);
+        for aov in self.aovs().iter() {
+            let sum = aov.layer().and_then(|layer| self.layer(layer, at)).unwrap_or_default();
+            match aov {
+                Aov::Albedo | Aov::Normal | Aov::GeometricNormal => values.extend((sum * all).as_vec3().to_array()),
+                Aov::Position => values.extend((sum * hits).as_vec3().to_array()),
+                Aov::Depth if pixel.hits() == 0 => values.push(f32::INFINITY),
+                Aov::Depth => values.push((sum.x * hits) as f32),
+                Aov::Variance => {
+                    // The square of a radiance that fits need not.
+                    let variance = pixel.sample_variance(sum).min(glam::DVec3::splat(f64::from(f32::MAX)));
+                    values.extend(variance.as_vec3().to_array());
+                }
+                Aov::SampleCount => values.push(pixel.count() as f32),
             }
-            if aovs.depth {
-                values.push(if sums.hits > 0 { (sums.depth * hits) as f32 } else { f32::INFINITY });
-            }
-        }
-        if aovs.variance {
-            // The square of a radiance that fits need not.
-            let variance = pixel.sample_variance().min(glam::DVec3::splat(f64::from(f32::MAX)));
-            values.extend(variance.as_vec3().to_array());
-        }
-        if aovs.sample_count {
-            values.push(pixel.count as f32);
         }
     }
 }
@@ -97,16 +76,19 @@ impl Image {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AovSet, TilePixel};
+    use super::super::{AovSet, Taken};
     use super::*;
+    use crate::integrator::FirstHit;
     use crate::world::Bounds;
 
     #[test]
     fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {
-        let mut film = Film::new([3, 2], Bounds::full([3, 2]), AovSet::all());
-        film.tiles()[0].for_each(|TilePixel { pixel, .. }| {
-            pixel.add(Rgb::new(2.0, 1.0e9, 0.0), 1.0, 1.0);
-            pixel.add(Rgb::new(6.0, 0.0, 0.0), 1.0, -0.5);
+        let mut film = Film::new([3, 2], Bounds::full([3, 2]), AovSet::all(), false);
+        film.tiles()[0].for_each(|mut pixel| {
+            let (alpha, prefix, first) = (1.0, Rgb::ZERO, &FirstHit::NOTHING);
+            let sample = |index, radiance, weight| Taken { index, radiance, alpha, weight, prefix, first };
+            pixel.add(&sample(0, Rgb::new(2.0, 1.0e9, 0.0), 1.0));
+            pixel.add(&sample(1, Rgb::new(6.0, 0.0, 0.0), -0.5));
         });
         let image = film.image();
         assert_eq!(image.values.len(), 6 * image.channels.len());

@@ -1,14 +1,21 @@
 //! The film: exact per-pixel sums of samples, and the image they make.
 //!
-//! A sample belongs to one pixel (filter importance sampling), and a pixel's samples are added in the order of their
-//! numbers whichever thread renders it, so the sums depend on neither threads nor tiles nor the cut into passes.
+//! A sample belongs to one pixel (filter importance sampling), and sums have the same bits whatever the order of their terms,
+//! so a film depends on neither threads nor tiles nor the cut into passes, and films of slices of a frame's samples add up
+//! to that of all of them.
 
+mod aov;
 pub mod exr;
 mod image;
 mod pixel;
+mod sum;
 
+pub use aov::{Aov, AovSet, Layer};
 pub use image::{Channel, Image};
-pub use pixel::{Auxiliary, Pixel, Split};
+pub use pixel::{Pixel, Taken};
+pub use sum::{MOST_TERMS, Sum};
+
+use glam::DVec3;
 
 use crate::math::Rgb;
 use crate::world::Bounds;
@@ -16,60 +23,6 @@ use crate::world::Bounds;
 /// Side of the square tiles that threads work on, in pixels: 256 pixels of a few paths each are some milliseconds of
 /// work, far above the cost of handing out a tile and far below that of a frame.
 pub const TILE: u32 = 16;
-
-/// Auxiliary outputs, by the names a user gives.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AovSet {
-    /// `albedo.{R,G,B}`: hemispherical reflectance at the first hit.
-    pub albedo: bool,
-    /// `N.{X,Y,Z}`: shading normal at the first hit, world space.
-    pub normal: bool,
-    /// `Ng.{X,Y,Z}`: geometric normal at the first hit, world space.
-    pub geometric_normal: bool,
-    /// `P.{X,Y,Z}`: position of the first hit, world space.
-    pub position: bool,
-    /// `depth.Z`: distance of the first hit from the camera ray's origin.
-    pub depth: bool,
-    /// `variance.{R,G,B}`: variance of one sample.
-    pub variance: bool,
-    /// `sampleCount`.
-    pub sample_count: bool,
-}
-
-impl AovSet {
-    /// Every name that [`Self::insert`] knows.
-    pub const NAMES: [&'static str; 7] = ["albedo", "N", "Ng", "P", "depth", "variance", "sampleCount"];
-
-    /// All of them.
-    pub fn all() -> Self {
-        let mut set = Self::default();
-        for name in Self::NAMES {
-            set.insert(name);
-        }
-        set
-    }
-
-    /// Adds the output `name`; false if there is none of that name.
-    pub fn insert(&mut self, name: &str) -> bool {
-        let flag = match name {
-            "albedo" => &mut self.albedo,
-            "N" => &mut self.normal,
-            "Ng" => &mut self.geometric_normal,
-            "P" => &mut self.position,
-            "depth" => &mut self.depth,
-            "variance" => &mut self.variance,
-            "sampleCount" => &mut self.sample_count,
-            _ => return false,
-        };
-        *flag = true;
-        true
-    }
-
-    /// Whether any output needs to know the first hit.
-    pub fn first_hit(&self) -> bool {
-        self.albedo || self.normal || self.geometric_normal || self.position || self.depth
-    }
-}
 
 /// Sums of all samples of a frame.
 #[derive(Clone, Debug)]
@@ -80,10 +33,10 @@ pub struct Film {
     tiles: [u32; 2],
     /// Tile by tile, [`TILE`]² pixels each, so that a tile is one contiguous piece that one thread owns.
     pixels: Vec<Pixel>,
-    /// In the same order; empty unless [`AovSet::first_hit`].
-    auxiliary: Vec<Auxiliary>,
-    /// In the same order; empty unless the frame is filtered.
-    split: Vec<Split>,
+    /// What is summed up besides.
+    layers: Vec<Layer>,
+    /// Sums of the layers of a pixel, pixel by pixel in the same order.
+    sums: Vec<Sum<3>>,
     /// In the same order: what the filter makes of the pixels, film RGB. Empty until then.
     filtered: Vec<Rgb>,
 }
@@ -96,8 +49,8 @@ pub struct Tile<'a> {
     /// Index of the first pixel in its film.
     first: u32,
     pixels: &'a mut [Pixel],
-    auxiliary: &'a mut [Auxiliary],
-    split: &'a mut [Split],
+    layers: &'a [Layer],
+    sums: &'a mut [Sum<3>],
 }
 
 /// A pixel of a tile.
@@ -106,56 +59,56 @@ pub struct TilePixel<'a> {
     pub at: [u32; 2],
     /// Its number within the film.
     pub index: u32,
-    /// Its sums.
-    pub pixel: &'a mut Pixel,
-    /// Its first-hit sums, if they are kept.
-    pub auxiliary: Option<&'a mut Auxiliary>,
-    /// Its sums for the filter, if they are kept.
-    pub split: Option<&'a mut Split>,
+    pixel: &'a mut Pixel,
+    layers: &'a [Layer],
+    sums: &'a mut [Sum<3>],
+}
+
+impl TilePixel<'_> {
+    /// Adds a sample.
+    #[inline]
+    pub fn add(&mut self, taken: &Taken<'_>) {
+        self.pixel.add(taken);
+        for (layer, sum) in self.layers.iter().zip(self.sums.iter_mut()) {
+            if !layer.first_hit() || taken.alpha > 0.0 {
+                sum.add(layer.term(taken));
+            }
+        }
+    }
 }
 
 impl Tile<'_> {
     /// Calls `visit` for each pixel of the tile that is within the film.
     pub fn for_each(&mut self, mut visit: impl FnMut(TilePixel<'_>)) {
-        let mut auxiliary = self.auxiliary.iter_mut();
-        let mut split = self.split.iter_mut();
+        let layers = self.layers;
+        let mut sums = self.sums.chunks_exact_mut(layers.len().max(1));
         for (offset, pixel) in (0..).zip(self.pixels.iter_mut()) {
-            let (auxiliary, split) = (auxiliary.next(), split.next());
+            let sums = sums.next().unwrap_or_default();
             let at = [self.origin[0] + offset % TILE, self.origin[1] + offset / TILE];
             if at[0] < self.bounds.max[0] && at[1] < self.bounds.max[1] {
-                visit(TilePixel { at, index: self.first + offset, pixel, auxiliary, split });
+                visit(TilePixel { at, index: self.first + offset, pixel, layers, sums });
             }
         }
     }
 }
 
 impl Film {
-    /// An empty film of `resolution` of which the pixels in `bounds` are rendered.
-    pub fn new(resolution: [u32; 2], bounds: Bounds, aovs: AovSet) -> Self {
+    /// An empty film of `resolution` of which the pixels in `bounds` are rendered. A `filtered` one keeps what a filter
+    /// needs.
+    pub fn new(resolution: [u32; 2], bounds: Bounds, aovs: AovSet, filtered: bool) -> Self {
         let tiles = [bounds.width().div_ceil(TILE), bounds.height().div_ceil(TILE)];
         let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
-        let auxiliary = if aovs.first_hit() { vec![Auxiliary::default(); count] } else { Vec::new() };
-        let pixels = vec![Pixel::default(); count];
-        Self { resolution, bounds, aovs, tiles, pixels, auxiliary, split: Vec::new(), filtered: Vec::new() }
-    }
-
-    /// From now on keeps the sums that a filter needs.
-    pub fn keep_split(&mut self) {
-        self.split = vec![Split::default(); self.pixels.len()];
+        let layers = layers(aovs, filtered);
+        let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
+        Self { resolution, bounds, aovs, tiles, pixels, layers, sums, filtered: Vec::new() }
     }
 
     /// Bytes that a film of this shape holds.
-    pub fn memory(bounds: Bounds, aovs: AovSet) -> u64 {
+    pub fn memory(bounds: Bounds, aovs: AovSet, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
-        let first_hit = if aovs.first_hit() { size_of::<Auxiliary>() } else { 0 };
-        pixels * (size_of::<Pixel>() + first_hit) as u64
-    }
-
-    /// Bytes that it holds besides for a filter.
-    pub fn filter_memory(bounds: Bounds) -> u64 {
-        Self::memory(bounds, AovSet::default()) / size_of::<Pixel>() as u64
-            * (size_of::<Split>() + size_of::<Rgb>()) as u64
+        let result = if filtered { size_of::<Rgb>() } else { 0 };
+        pixels * (size_of::<Pixel>() + layers(aovs, filtered).len() * size_of::<Sum<3>>() + result) as u64
     }
 
     /// Width and height of the whole frame.
@@ -173,11 +126,15 @@ impl Film {
         self.aovs
     }
 
+    /// Number of tiles.
+    pub fn tile_count(&self) -> usize {
+        self.tiles[0] as usize * self.tiles[1] as usize
+    }
+
     /// All tiles, each independently mutable.
     pub fn tiles(&mut self) -> Vec<Tile<'_>> {
-        let (bounds, across) = (self.bounds, self.tiles[0]);
-        let mut auxiliary = self.auxiliary.chunks_mut((TILE * TILE) as usize);
-        let mut split = self.split.chunks_mut((TILE * TILE) as usize);
+        let (bounds, across, layers) = (self.bounds, self.tiles[0], self.layers.as_slice());
+        let mut sums = self.sums.chunks_mut((TILE * TILE) as usize * layers.len().max(1));
         self.pixels
             .chunks_mut((TILE * TILE) as usize)
             .zip(0u32..)
@@ -186,8 +143,8 @@ impl Film {
                 bounds,
                 first: index * TILE * TILE,
                 pixels,
-                auxiliary: auxiliary.next().unwrap_or_default(),
-                split: split.next().unwrap_or_default(),
+                layers,
+                sums: sums.next().unwrap_or_default(),
             })
             .collect()
     }
@@ -197,14 +154,15 @@ impl Film {
         &self.pixels[self.index(at)]
     }
 
-    /// First-hit sums of the pixel at `[x, y]`, if they are kept.
-    pub fn auxiliary(&self, at: [u32; 2]) -> Option<&Auxiliary> {
-        self.auxiliary.get(self.index(at))
+    /// A layer's sum of the pixel at `[x, y]`, if it is kept.
+    pub fn layer(&self, layer: Layer, at: [u32; 2]) -> Option<DVec3> {
+        let which = self.layers.iter().position(|kept| *kept == layer)?;
+        Some(DVec3::from_array(self.sums[self.index(at) * self.layers.len() + which].value()))
     }
 
-    /// The filter's sums of the pixel at `[x, y]`, if they are kept.
-    pub fn split(&self, at: [u32; 2]) -> Option<&Split> {
-        self.split.get(self.index(at))
+    /// Whether samples' first hits are looked at.
+    pub fn first_hit(&self) -> bool {
+        self.layers.iter().any(|layer| layer.first_hit())
     }
 
     /// Sets what the filter makes of all pixels, film RGB, row by row over the bounds.
@@ -219,6 +177,45 @@ impl Film {
     /// Value of the pixel at `[x, y]`, film RGB: filtered if the frame is.
     pub fn value(&self, at: [u32; 2]) -> glam::DVec3 {
         self.filtered.get(self.index(at)).map_or_else(|| self.pixel(at).mean(), |value| value.as_dvec3())
+    }
+
+    /// Adds the samples of another film.
+    ///
+    /// # Panics
+    /// If it is not of the same shape.
+    pub fn merge(&mut self, other: &Self) {
+        assert!((self.bounds, &self.layers) == (other.bounds, &other.layers), "films of different shapes");
+        self.pixels.iter_mut().zip(&other.pixels).for_each(|(pixel, other)| pixel.merge(other));
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
+    }
+
+    /// Words that each pixel is stored as.
+    pub fn words_per_pixel(&self) -> usize {
+        Pixel::WORDS + self.layers.len() * Sum::<3>::WORDS
+    }
+
+    /// Appends the words of the pixels `range`, by their indices, to be stored.
+    pub fn store(&self, range: std::ops::Range<usize>, words: &mut Vec<u64>) {
+        let layers = self.layers.len();
+        for index in range {
+            self.pixels[index].store(words);
+            self.sums[index * layers..(index + 1) * layers].iter().for_each(|sum| sum.store(words));
+        }
+    }
+
+    /// Adds the samples of pixels that another film has stored, from the index `first` on. `None`, with some of them added,
+    /// where no film has such words.
+    pub fn load(&mut self, first: usize, mut words: &[u64]) -> Option<()> {
+        let layers = self.layers.len();
+        let mut index = first;
+        while !words.is_empty() {
+            self.pixels.get_mut(index)?.merge(&Pixel::load(&mut words)?);
+            for sum in &mut self.sums[index * layers..(index + 1) * layers] {
+                sum.merge(&Sum::load(&mut words)?);
+            }
+            index += 1;
+        }
+        Some(())
     }
 
     /// One past the largest index of a pixel.
@@ -242,31 +239,66 @@ impl Film {
     }
 }
 
+/// What films of these outputs sum up.
+fn layers(aovs: AovSet, filtered: bool) -> Vec<Layer> {
+    aovs.iter().filter_map(Aov::layer).chain(filtered.then_some(Layer::Prefix)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrator::FirstHit;
+
+    fn taken(index: u64, radiance: Rgb) -> Taken<'static> {
+        const FIRST: FirstHit = FirstHit { depth: 2.0, ..FirstHit::NOTHING };
+        Taken { index, radiance, alpha: 1.0, weight: 1.0, prefix: 0.5 * radiance, first: &FIRST }
+    }
 
     #[test]
     fn tiles_cover_each_pixel_of_the_bounds_once() {
         let bounds = Bounds { min: [5, 3], max: [40, 21] };
-        let mut film = Film::new([50, 30], bounds, AovSet::all());
+        let mut film = Film::new([50, 30], bounds, AovSet::all(), true);
         for mut tile in film.tiles() {
-            tile.for_each(|TilePixel { at: [x, y], pixel, auxiliary, .. }| {
-                pixel.add(Rgb::splat((100 * y + x) as f32), 1.0, 1.0);
-                assert!(auxiliary.is_some());
+            tile.for_each(|mut pixel| {
+                let [x, y] = pixel.at;
+                pixel.add(&taken(0, Rgb::splat((100 * y + x) as f32)));
             });
         }
-        for y in 3..21 {
-            for x in 5..40 {
-                assert_eq!(film.pixel([x, y]).mean().x, f64::from(100 * y + x));
-                assert_eq!(film.pixel([x, y]).count, 1);
-            }
+        for at in bounds.pixels() {
+            let value = f64::from(100 * at[1] + at[0]);
+            assert_eq!(film.pixel(at).mean().x, value);
+            assert_eq!(film.pixel(at).count(), 1);
+            assert_eq!(film.layer(Layer::Prefix, at).unwrap().x, 0.5 * value);
+            assert_eq!(film.layer(Layer::Depth, at).unwrap().x, 2.0);
         }
     }
 
     #[test]
-    fn every_aov_name_is_known_and_no_other() {
-        assert!(AovSet::NAMES.iter().all(|name| AovSet::default().insert(name)));
-        assert!(!AovSet::default().insert("Depth"));
+    fn stored_films_add_up() {
+        let bounds = Bounds::full([20, 3]);
+        let film = |samples: std::ops::Range<u64>| {
+            let mut film = Film::new([20, 3], bounds, AovSet::all(), true);
+            for mut tile in film.tiles() {
+                tile.for_each(|mut pixel| {
+                    let brightness = pixel.at[0] as f32 * 0.1;
+                    samples.clone().for_each(|k| pixel.add(&taken(k, Rgb::splat(brightness / (k + 1) as f32))));
+                });
+            }
+            film
+        };
+        let words = |film: &Film| {
+            let mut words = Vec::new();
+            film.store(0..film.slots(), &mut words);
+            assert_eq!(words.len(), film.slots() * film.words_per_pixel());
+            words
+        };
+        let whole = words(&film(0..9));
+        let mut sum = film(4..9);
+        sum.load(0, &words(&film(0..4))).unwrap();
+        assert!(words(&sum) == whole);
+        let mut sum = film(0..4);
+        sum.merge(&film(4..9));
+        assert!(words(&sum) == whole);
+        assert_eq!(film(0..1).load(0, &whole[1..]), None);
     }
 }

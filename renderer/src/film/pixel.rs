@@ -2,33 +2,116 @@
 
 use glam::DVec3;
 
+use super::sum::Sum;
 use crate::integrator::FirstHit;
 use crate::math::Rgb;
 
-/// Weighted sums of a pixel's samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// A sample as the film takes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken<'a> {
+    /// Its number within the pixel.
+    pub index: u64,
+    /// Finite, film RGB.
+    pub radiance: Rgb,
+    /// Coverage.
+    pub alpha: f32,
+    /// Of the pixel filter, of either sign.
+    pub weight: f32,
+    /// The light in it that the frame's filter does not touch, scene RGB as the sensor takes it.
+    pub prefix: Rgb,
+    /// What auxiliary outputs see; not looked at unless `alpha` is above 0.
+    pub first: &'a FirstHit,
+}
+
+impl Taken<'_> {
+    /// w L, rounded as the sums take it.
+    #[inline]
+    pub(super) fn value(&self) -> DVec3 {
+        (self.radiance * self.weight).as_dvec3()
+    }
+}
+
+/// Weighted sums of a pixel's samples, those of even numbers and those of odd ones apart: the sampler makes two independent
+/// images of them. No bit depends on the order in which samples come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pixel {
-    /// Σ w L.
-    pub sum: DVec3,
-    /// Σ (w L)².
-    pub sum_of_squares: DVec3,
-    /// Σ w alpha.
-    pub alpha: f64,
-    /// Σ w. Nearly all weights are ± one constant.
-    pub weight: f64,
+    /// Σ w L of even and of odd samples.
+    halves: [Sum<3>; 2],
+    /// Σ w of even and of odd samples, in quanta. Nearly all weights are ± one constant.
+    weights: [i64; 2],
+    /// Σ w alpha, in quanta.
+    alpha: i64,
     /// Number of samples, rejected ones included: a rejected sample counts as black.
-    pub count: u64,
+    count: u32,
+    /// Number of samples that met a surface.
+    hits: u32,
+}
+
+/// Quanta of weights: 2⁻³⁶, so that 2²³ weights of up to 16 fit.
+const WEIGHT_BITS: i32 = 36;
+
+/// A weight in quanta.
+fn quanta(weight: f32) -> i64 {
+    (f64::from(weight.clamp(-16.0, 16.0)) * 2f64.powi(WEIGHT_BITS)).round() as i64
+}
+
+/// A number of quanta as a weight.
+fn weight(quanta: i64) -> f64 {
+    quanta as f64 * 2f64.powi(-WEIGHT_BITS)
 }
 
 impl Pixel {
-    /// Adds a sample of finite, non-negative radiance (film RGB) with a filter weight of either sign.
-    pub fn add(&mut self, radiance: Rgb, alpha: f32, weight: f32) {
-        let value = (radiance * weight).as_dvec3();
-        self.sum += value;
-        self.sum_of_squares += value * value;
-        self.alpha += f64::from(alpha * weight);
-        self.weight += f64::from(weight);
+    /// Words that a pixel is stored as.
+    pub const WORDS: usize = 2 * Sum::<3>::WORDS + 4;
+
+    /// Adds a sample.
+    #[inline]
+    pub fn add(&mut self, taken: &Taken<'_>) {
+        let half = (taken.index % 2) as usize;
+        self.halves[half].add(taken.value().to_array());
+        self.weights[half] += quanta(taken.weight);
+        self.alpha += quanta(taken.alpha * taken.weight);
         self.count += 1;
+        self.hits += u32::from(taken.alpha > 0.0);
+    }
+
+    /// Adds the samples of another film's pixel.
+    pub fn merge(&mut self, other: &Self) {
+        for half in 0..2 {
+            self.halves[half].merge(&other.halves[half]);
+            self.weights[half] = self.weights[half].saturating_add(other.weights[half]);
+        }
+        self.alpha = self.alpha.saturating_add(other.alpha);
+        self.count = self.count.saturating_add(other.count);
+        self.hits = self.hits.saturating_add(other.hits);
+    }
+
+    /// Σ w L, film RGB.
+    pub fn sum(&self) -> DVec3 {
+        let [even, odd] = self.halves.map(|half| DVec3::from_array(half.value()));
+        even + odd
+    }
+
+    /// Means of even and of odd samples, film RGB: independent of each other. `None` without both.
+    pub fn halves(&self) -> Option<[DVec3; 2]> {
+        let weights = self.weights.map(weight);
+        let means = [0, 1].map(|half| DVec3::from_array(self.halves[half].value()) / weights[half]);
+        (weights[0] > 0.0 && weights[1] > 0.0).then_some(means)
+    }
+
+    /// Σ w of even and of odd samples.
+    pub fn half_weights(&self) -> [f64; 2] {
+        self.weights.map(weight)
+    }
+
+    /// Number of samples.
+    pub fn count(&self) -> u64 {
+        self.count.into()
+    }
+
+    /// Number of samples that met a surface.
+    pub fn hits(&self) -> u64 {
+        self.hits.into()
     }
 
     /// The pixel's value, film RGB; negative only if the filter has negative lobes. Zero without samples.
@@ -36,79 +119,46 @@ impl Pixel {
     /// The sum of the weights normalises, not the number of samples: their ratio tends to one, and the ratio estimator
     /// leaves a constant image constant. Where few samples of a negative-lobed filter cancel, the number serves.
     pub fn mean(&self) -> DVec3 {
-        self.sum / self.normalisation()
+        self.sum() / self.normalisation()
     }
 
     /// Mean coverage.
     pub fn mean_alpha(&self) -> f64 {
-        self.alpha / self.normalisation()
+        weight(self.alpha) / self.normalisation()
     }
 
-    /// Unbiased estimate of the variance of one weighted sample, film RGB squared. Zero below two samples.
-    pub fn sample_variance(&self) -> DVec3 {
+    /// Unbiased estimate of the variance of one weighted sample from the sum of their squares, film RGB squared. Zero
+    /// below two samples.
+    pub fn sample_variance(&self, squares: DVec3) -> DVec3 {
         if self.count < 2 {
             return DVec3::ZERO;
         }
-        let n = self.count as f64;
-        ((self.sum_of_squares - self.sum * self.sum / n) / (n - 1.0)).max(DVec3::ZERO)
+        let (n, sum) = (f64::from(self.count), self.sum());
+        ((squares - sum * sum / n) / (n - 1.0)).max(DVec3::ZERO)
     }
 
     /// What sums are divided by.
     pub fn normalisation(&self) -> f64 {
-        let n = self.count.max(1) as f64;
+        let n = f64::from(self.count.max(1));
+        let weight = weight(self.weights[0].saturating_add(self.weights[1]));
         // Half the expected sum: a smaller one has lost most of its digits to cancellation.
-        if self.weight > 0.5 * n { self.weight } else { n }
+        if weight > 0.5 * n { weight } else { n }
     }
-}
 
-/// Sums of a pixel's first hits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Auxiliary {
-    /// Σ albedo.
-    pub albedo: DVec3,
-    /// Σ shading normal.
-    pub ns: DVec3,
-    /// Σ geometric normal.
-    pub ng: DVec3,
-    /// Σ position.
-    pub p: DVec3,
-    /// Σ distance.
-    pub depth: f64,
-    /// Number of samples that met a surface.
-    pub hits: u64,
-}
-
-impl Auxiliary {
-    /// Adds the first hit of a sample that met a surface.
-    pub fn add(&mut self, first: &FirstHit) {
-        self.albedo += first.albedo.as_dvec3();
-        self.ns += first.ns.as_dvec3();
-        self.ng += first.ng.as_dvec3();
-        self.p += first.p;
-        self.depth += f64::from(first.depth);
-        self.hits += 1;
+    /// Appends the pixel's [`Self::WORDS`], to be stored.
+    pub fn store(&self, words: &mut Vec<u64>) {
+        self.halves.iter().for_each(|half| half.store(words));
+        words.extend(self.weights.map(|x| x as u64));
+        words.extend([self.alpha as u64, u64::from(self.count) | u64::from(self.hits) << 32]);
     }
-}
 
-/// What a filtered frame keeps of a pixel besides [`Pixel`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Split {
-    /// Σ w L of the light that the filter does not touch, scene RGB.
-    pub prefix: DVec3,
-    /// Σ w L of odd samples, film RGB.
-    pub odd: DVec3,
-    /// Σ w of odd samples.
-    pub odd_weight: f64,
-}
-
-impl Split {
-    /// Adds a sample: its whole radiance (film RGB), and what of it the filter leaves alone (scene RGB).
-    pub fn add(&mut self, index: u64, radiance: Rgb, prefix: Rgb, weight: f32) {
-        self.prefix += (prefix * weight).as_dvec3();
-        if index % 2 == 1 {
-            self.odd += (radiance * weight).as_dvec3();
-            self.odd_weight += f64::from(weight);
-        }
+    /// Takes what [`Self::store`] appended off the front; `None` where no pixel has such words.
+    pub fn load(words: &mut &[u64]) -> Option<Self> {
+        let halves = [Sum::load(words)?, Sum::load(words)?];
+        let (&[even, odd, alpha, counts], rest) = words.split_first_chunk::<4>()?;
+        *words = rest;
+        let weights = [even as i64, odd as i64];
+        Some(Self { halves, weights, alpha: alpha as i64, count: counts as u32, hits: (counts >> 32) as u32 })
     }
 }
 
@@ -116,24 +166,51 @@ impl Split {
 mod tests {
     use super::*;
 
+    fn taken(index: u64, radiance: Rgb, weight: f32) -> Taken<'static> {
+        const NOTHING: FirstHit = FirstHit::NOTHING;
+        Taken { index, radiance, alpha: 1.0, weight, prefix: Rgb::ZERO, first: &NOTHING }
+    }
+
     #[test]
     fn mean_and_variance_are_those_of_the_samples() {
-        let mut pixel = Pixel::default();
-        for value in [1.0, 2.0, 3.0, 6.0] {
-            pixel.add(Rgb::new(value, 1.0e-6 * value, 5.0), 1.0, 1.0);
+        let (mut pixel, mut squares) = (Pixel::default(), DVec3::ZERO);
+        for (index, value) in (0..).zip([1.0, 2.0, 3.0, 6.0]) {
+            let sample = taken(index, Rgb::new(value, 1.0e-6 * value, 5.0), 1.0);
+            pixel.add(&sample);
+            squares += sample.value() * sample.value();
         }
         assert_eq!(pixel.mean().x, 3.0);
-        assert!((pixel.sample_variance().x - 14.0 / 3.0).abs() < 1e-12);
-        assert_eq!(pixel.sample_variance().z, 0.0);
+        assert_eq!(pixel.halves().unwrap().map(|half| half.x), [2.0, 4.0]);
+        assert!((pixel.sample_variance(squares).x - 14.0 / 3.0).abs() < 1e-12);
+        assert_eq!(pixel.sample_variance(squares).z, 0.0);
         assert_eq!(pixel.mean_alpha(), 1.0);
     }
 
     #[test]
     fn a_constant_stays_constant_under_a_filter_with_negative_lobes() {
         let mut pixel = Pixel::default();
-        for k in 0..16 {
-            pixel.add(Rgb::ONE, 1.0, if k % 8 == 0 { -1.25 } else { 1.25 });
-        }
+        (0..16).for_each(|k| pixel.add(&taken(k, Rgb::ONE, if k % 8 == 0 { -1.25 } else { 1.25 })));
         assert_eq!(pixel.mean(), DVec3::ONE);
+    }
+
+    #[test]
+    fn slices_merge_to_the_whole_in_any_order_and_survive_storing() {
+        let samples: Vec<_> = (0..100)
+            .map(|k| taken(k, Rgb::new(0.1, 1.0 / (k + 1) as f32, 1e9 * (k % 7) as f32), 1.0 - 0.01 * k as f32))
+            .collect();
+        let pixel = |range: std::ops::Range<usize>| {
+            let mut pixel = Pixel::default();
+            samples[range].iter().for_each(|sample| pixel.add(sample));
+            let mut words = Vec::new();
+            pixel.store(&mut words);
+            assert_eq!(words.len(), Pixel::WORDS);
+            Pixel::load(&mut words.as_slice()).unwrap()
+        };
+        let whole = pixel(0..100);
+        for parts in [[0..33, 33..34, 34..100], [34..100, 0..33, 33..34]] {
+            let mut merged = Pixel::default();
+            parts.into_iter().for_each(|range| merged.merge(&pixel(range)));
+            assert_eq!(merged, whole);
+        }
     }
 }

@@ -14,7 +14,7 @@
 use filter::Resolved;
 use glam::Vec3;
 
-use crate::film::Film;
+use crate::film::{Film, Layer};
 use crate::math::Rgb;
 
 /// A pixel with all that speaks for and against its filtered value, film RGB.
@@ -64,20 +64,19 @@ impl Pixel {
     /// Gathers a pixel from its film and its filter.
     pub fn new(film: &Film, at: [u32; 2], resolved: &Resolved, expose: impl Fn(Vec3) -> Vec3) -> Self {
         let pixel = film.pixel(at);
-        let split = film.split(at).copied().unwrap_or_default();
+        let prefix = film.layer(Layer::Prefix, at).unwrap_or_default().as_vec3();
         let scale = 1.0 / pixel.normalisation();
-        let even_weight = pixel.weight - split.odd_weight;
-        let both = split.odd_weight > 0.0 && even_weight > 0.0;
-        let noise = |even: Vec3, odd: Vec3| 0.5 * (even / even_weight as f32 - odd / split.odd_weight as f32);
         let sums = |sum: Vec3| expose(sum) * scale as f32;
         let [even, odd] = resolved.glossy_own.map(&expose);
+        let [even_weight, odd_weight] = pixel.half_weights().map(|weight| weight as f32);
+        let halves = pixel.halves();
         Self {
-            own: (pixel.sum * scale).as_vec3(),
-            own_noise: both.then(|| noise((pixel.sum - split.odd).as_vec3(), split.odd.as_vec3())),
-            base: sums(split.prefix.as_vec3() + resolved.diffuse),
+            own: pixel.mean().as_vec3(),
+            own_noise: halves.map(|[even, odd]| (0.5 * (even - odd)).as_vec3()),
+            base: sums(prefix + resolved.diffuse),
             glossy: sums(resolved.glossy),
-            glossy_own: (even + odd) * scale as f32,
-            glossy_noise: if both { noise(even, odd) } else { Vec3::ZERO },
+            glossy_own: sums(resolved.glossy_own[0] + resolved.glossy_own[1]),
+            glossy_noise: halves.map_or(Vec3::ZERO, |_| 0.5 * (even / even_weight - odd / odd_weight)),
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use filter::PathRecord;
 
-use crate::film::Split;
 use crate::integrator::{Cut, Recorder, Unrecorded};
 use crate::math::Rgb;
 
@@ -12,26 +11,21 @@ pub trait Keeper: Send {
     type Recorder: Recorder;
     /// What looks at one path.
     fn recorder(&self) -> Self::Recorder;
-    /// Takes the recorder of a finished path.
-    fn keep(&mut self, recorder: &Self::Recorder, sample: Keep<'_>);
+    /// Takes the recorder of a finished path; the light in it that the filter does not touch, scene RGB.
+    fn keep(&mut self, recorder: &Self::Recorder, sample: Keep) -> Rgb;
 }
 
 /// Where a path belongs.
-pub struct Keep<'a> {
+#[derive(Clone, Copy, Debug)]
+pub struct Keep {
     /// The pixel's number.
     pub slot: u32,
     /// The path's number within the pixel.
     pub index: u64,
-    /// Along the camera ray, scene RGB.
+    /// Along the camera ray, scene RGB; black if it was rejected.
     pub radiance: Rgb,
-    /// The same as the sensor takes it, film RGB.
-    pub exposed: Rgb,
-    /// Of the pixel filter.
+    /// What its light counts for: weight of the pixel filter, times the share of it that the sensor takes.
     pub weight: f32,
-    /// Share of the radiance that the sensor takes.
-    pub exposure: f32,
-    /// The pixel's sums for the filter.
-    pub split: Option<&'a mut Split>,
 }
 
 /// Nothing is kept.
@@ -45,7 +39,9 @@ impl Keeper for Nothing {
         Unrecorded
     }
     #[inline]
-    fn keep(&mut self, _: &Unrecorded, _: Keep<'_>) {}
+    fn keep(&mut self, _: &Unrecorded, _: Keep) -> Rgb {
+        Rgb::ZERO
+    }
 }
 
 /// Which vertex of a path others share: the first of those that are no mirror and no smooth glass, or a later one.
@@ -82,10 +78,8 @@ impl Keeper for Paths {
         Cut::after(self.selection as u8)
     }
     #[inline]
-    fn keep(&mut self, cut: &Cut, sample: Keep<'_>) {
-        self.records.extend(cut.record(sample.slot, sample.index, sample.weight * sample.exposure));
-        if let Some(split) = sample.split {
-            split.add(sample.index, sample.exposed, cut.prefix() * sample.exposure, sample.weight);
-        }
+    fn keep(&mut self, cut: &Cut, sample: Keep) -> Rgb {
+        self.records.extend(cut.record(sample.slot, sample.index, sample.weight));
+        cut.prefix()
     }
 }

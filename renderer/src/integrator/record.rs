@@ -29,3 +29,8 @@ pub struct FirstHit {
     /// Distance along the camera ray.
     pub depth: f32,
 }
+
+impl FirstHit {
+    /// No hit.
+    pub const NOTHING: Self = Self { albedo: Rgb::ZERO, ns: Vec3::ZERO, ng: Vec3::ZERO, p: DVec3::ZERO, depth: 0.0 };
+}

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
-use renderer::film::{AovSet, Film};
+use renderer::film::{AovSet, Film, Layer};
 use renderer::filtering::Paths;
 use renderer::integrator::{AlphaTested, Opaque, Queries};
 use renderer::render::{Job, Prepared, Unobserved, prepare, trace_tile};
@@ -46,11 +46,10 @@ struct Traced {
 impl Traced {
     fn new<Q: Queries>(prepared: &Prepared, queries: &Q) -> Self {
         let world = &prepared.world;
-        let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::all());
-        film.keep_split();
+        let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::all(), true);
         let (mut paths, sampler) = (Paths::default(), Sampler::new(prepared.description.seed));
         for tile in &mut film.tiles() {
-            let samples = &prepared.description.sample_range_asked;
+            let samples = &prepared.description.asked;
             trace_tile(world, queries, tile, samples, &sampler, true, &mut paths);
         }
         Self { film, paths }
@@ -63,7 +62,7 @@ impl Traced {
             sums[record.slot as usize] += brought.as_dvec3();
         }
         let value = |at| {
-            let prefix = self.film.split(at).map_or(DVec3::ZERO, |split| split.prefix);
+            let prefix = self.film.layer(Layer::Prefix, at).unwrap_or_default();
             let radiance = (prefix + sums[self.film.index(at)]) / self.film.pixel(at).normalisation();
             (prepared.world.sensor.response * radiance.as_vec3()).to_array()
         };
@@ -78,10 +77,11 @@ impl Traced {
         let seen: Vec<(Vec3, Vec3, f32)> = film
             .bounds()
             .pixels()
-            .map(|at| film.auxiliary(at).copied().unwrap_or_default())
-            .map(|sums| {
-                let depth = if sums.hits > 0 { sums.depth / sums.hits as f64 } else { f64::INFINITY };
-                (mean(sums.ns, sums.hits), mean(sums.albedo, sums.hits), depth as f32)
+            .map(|at| {
+                let hits = film.pixel(at).hits();
+                let seen = |layer| mean(film.layer(layer, at).unwrap_or_default(), hits);
+                let depth = if hits > 0 { seen(Layer::Depth).x } else { f32::INFINITY };
+                (seen(Layer::Normal), seen(Layer::Albedo), depth)
             })
             .collect();
         let normal: Vec<[f32; 3]> = seen.iter().map(|(n, _, _)| n.to_array()).collect();

@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
             Some(alpha) => replay(&prepared, &AlphaTested { scene: prepared.world.geometry.scene(), alpha }, spp),
         };
         let (parse, compile) = (prepared.statistics.parse_seconds, prepared.statistics.compile_seconds);
-        let frame = render::trace(prepared, None, &Unobserved);
+        let frame = render::trace(prepared, None, None, &Unobserved);
         let statistics = frame.statistics;
         let rays = statistics.counters.closest_hit_rays + statistics.counters.shadow_rays;
         let line = serde_json::json!({
@@ -66,11 +66,12 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
 /// Wall seconds that the queries of the whole frame take by themselves, on all threads.
 fn replay<Q: Queries + Sync>(prepared: &Prepared, queries: &Q, spp: u64) -> f64 {
     let world = &prepared.world;
-    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default());
+    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default(), false);
     let sampler = Sampler::new(prepared.description.seed);
     let nanoseconds = AtomicU64::new(0);
     let found = AtomicU64::new(0);
-    for pass in render::passes(&(0..spp)) {
+    for sample in 0..spp {
+        let pass = sample..sample + 1;
         film.tiles().par_iter_mut().for_each(|tile| {
             let recording = Recording::new(queries);
             render::trace_tile(world, &recording, tile, &pass, &sampler, false, &mut Nothing);

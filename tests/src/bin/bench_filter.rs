@@ -16,7 +16,7 @@
 
 use std::path::{Path, PathBuf};
 
-use renderer::film::{AovSet, exr};
+use renderer::film::{Aov, exr};
 use renderer::filtering::{Filtering, Report};
 use renderer::render::{self, Frame, Job, Statistics, Unobserved};
 use serde_json::{Map, Value, json};
@@ -166,8 +166,8 @@ impl Bench {
     }
 
     fn render(&self, spp: u64, filtering: Filtering) -> Result<Frame, Failure> {
-        let aovs =
-            AovSet { albedo: self.settings.out.is_some(), normal: self.settings.out.is_some(), ..AovSet::default() };
+        let guides = self.settings.out.is_some().then_some([Aov::Albedo, Aov::Normal]);
+        let aovs = guides.into_iter().flatten().collect();
         let frame = render::render(&Job { spp: Some(spp), filtering, aovs, ..self.job.clone() }, &Unobserved)?;
         if let Some(folder) = &self.settings.out {
             let folder = folder.join(filtering.name());

@@ -185,8 +185,8 @@ fn positions_and_matrices_are_those_of_the_file() {
     let mut aovs = renderer::film::AovSet::default();
     aovs.insert("P");
     let rendered = frame(&text, renderer::render::Job { aovs, ..job(4, Filtering::None) });
-    let sums = rendered.film.auxiliary([1, 1]).expect("positions were asked for");
-    let p = sums.p / sums.hits as f64;
+    let sum = rendered.film.layer(renderer::film::Layer::Position, [1, 1]).expect("positions were asked for");
+    let p = sum / rendered.film.pixel([1, 1]).hits() as f64;
     let eye = rendered.description.camera_from_world.project_point3(glam::DVec3::new(by, by, by + 5.0));
     let ndc = rendered.description.ndc_from_world.expect("a perspective").project_point3(glam::DVec3::splat(by));
     println!("first hit at {p}, the eye in its own space at {eye}, the target on the screen at {ndc}");

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Mutex;
 
+use renderer::film::{Aov, AovSet};
 use renderer::filtering::Filtering;
 use renderer::render::{Frame, Job, Observer, render};
 use renderer::scene::Diagnostic;
@@ -79,9 +80,10 @@ pub fn size(variable: &str, otherwise: u32) -> u32 {
     std::env::var(variable).ok().and_then(|size| size.parse().ok()).unwrap_or(otherwise)
 }
 
-/// A job of `spp` samples with one seed.
+/// A job of `spp` samples with one seed, and with variances, by which means are judged.
 pub fn job(spp: u64, filtering: Filtering) -> Job {
-    Job { spp: Some(spp), seed: Some(3), filtering, ..Job::default() }
+    let aovs = AovSet::from_iter([Aov::Variance]);
+    Job { spp: Some(spp), seed: Some(3), filtering, aovs, ..Job::default() }
 }
 
 /// Hears what is said.

@@ -1,0 +1,76 @@
+//! The metadata of images.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use oiio::Attribute;
+use renderer::filtering::Filtering;
+use renderer::frame::{FrameDescription, Samples};
+use renderer::render::Frame;
+
+use crate::{job, stats};
+
+/// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
+/// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
+pub fn of_frame(frame: &Frame, provenance: bool) -> Vec<(String, Attribute)> {
+    let (description, samples) = (&frame.description, &frame.samples);
+    let text = |text: String| Attribute::Text(text);
+    let mut attributes = vec![
+        ("Software".into(), text(job::software())),
+        ("DateTime".into(), text(job::date(std::env::var("SOURCE_DATE_EPOCH").ok().as_deref()))),
+        ("chromaticities".into(), Attribute::Floats(REC709.into())),
+        ("worldtocamera".into(), Attribute::Matrix(description.camera_from_world.as_mat4().to_cols_array())),
+        ("samplesPerPixel".into(), Attribute::Int(i32::try_from(samples.count()).unwrap_or(i32::MAX))),
+        ("tessera/version".into(), text(env!("CARGO_PKG_VERSION").into())),
+        ("tessera/integrator".into(), text("path".into())),
+        ("tessera/seed".into(), text(description.seed.to_string())),
+        ("tessera/frame".into(), Attribute::Int(description.number)),
+        ("tessera/sampleRange".into(), text(samples.to_string())),
+        ("tessera/filter".into(), text(filter_settings(&description.filtering))),
+        ("tessera/complete".into(), Attribute::Int(frame.complete().into())),
+        ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
+        ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(description)))),
+    ];
+    if let Some(ndc_from_world) = description.ndc_from_world {
+        let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
+        attributes.push(("worldtoNDC".into(), matrix));
+    }
+    if provenance {
+        add_provenance(&mut attributes, frame);
+    }
+    attributes
+}
+
+/// Chromaticities of red, green, blue and white: ITU-R BT.709.
+const REC709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
+
+/// A filter as the image's metadata name it: its name and all its settings.
+fn filter_settings(filtering: &Filtering) -> String {
+    let settings = filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
+    filtering.name().to_owned() + &settings.collect::<String>()
+}
+
+/// What two files must share, besides the scene, for their samples to belong to one picture: not the sample range.
+fn settings_hash(description: &FrameDescription) -> u64 {
+    let settings = description.settings().into_iter().filter(|(name, _)| *name != "scene");
+    job::hash(settings.map(|(name, value)| format!("{name} {value}\n")).collect::<String>().as_bytes())
+}
+
+/// The first sample and one past the last.
+pub fn span(samples: &Samples) -> [u64; 2] {
+    let (first, last) = (samples.ranges().first(), samples.ranges().last());
+    first.zip(last).map_or([0, 0], |(first, last)| [first.start, last.end])
+}
+
+fn add_provenance(attributes: &mut Vec<(String, Attribute)>, frame: &Frame) {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    attributes.retain(|(name, _)| name != "DateTime");
+    attributes.push(("DateTime".into(), Attribute::Text(job::exif_date(now))));
+    if let Ok(host) = std::fs::read_to_string("/proc/sys/kernel/hostname") {
+        attributes.push(("HostComputer".into(), Attribute::Text(host.trim().into())));
+    }
+    attributes.push(("renderTimeSeconds".into(), Attribute::Float(frame.statistics.render_seconds as f32)));
+    attributes.push(("tessera/threads".into(), Attribute::Int(frame.statistics.threads as i32)));
+    if let Some(bytes) = stats::peak_memory() {
+        attributes.push(("tessera/peakRSS".into(), Attribute::Text(bytes.to_string())));
+    }
+}

@@ -1,0 +1,226 @@
+//! A frame in the making: what it is, and all that its samples have added to it so far.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use glam::DMat4;
+
+use crate::film::{self, AovSet, Film};
+use crate::filtering::{self, Filtering, FrameFilter, Surroundings};
+use crate::integrator::Counters;
+use crate::world::Bounds;
+
+/// What of a frame depends on the scene and the job alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameDescription {
+    /// Number of the frame in its sequence.
+    pub number: i32,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// Samples of each pixel that the whole frame has.
+    pub spp: u64,
+    /// Those of them that this job is to take.
+    pub asked: Range<u64>,
+    /// Hash of the text of the scene's files.
+    pub scene_hash: u64,
+    /// Width and height of the whole frame.
+    pub resolution: [u32; 2],
+    /// The pixels that are rendered.
+    pub bounds: Bounds,
+    /// Auxiliary outputs.
+    pub aovs: AovSet,
+    /// How the frame is filtered.
+    pub filtering: Filtering,
+    /// What a filter must know of the world.
+    pub surroundings: Surroundings,
+    /// Camera space from world space.
+    pub camera_from_world: DMat4,
+    /// Screen space, normalised to [0, 1]², from world space; `None` for a camera without such a space.
+    pub ndc_from_world: Option<DMat4>,
+    /// The output that the scene names.
+    pub filename: Option<PathBuf>,
+}
+
+impl FrameDescription {
+    /// All that two slices of a frame must share for their samples to belong to one picture, in words, one line each.
+    pub fn settings(&self) -> Vec<(&'static str, String)> {
+        let Bounds { min, max } = self.bounds;
+        let filter = self.filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
+        vec![
+            ("version", env!("CARGO_PKG_VERSION").into()),
+            ("scene", format!("{:016x}", self.scene_hash)),
+            ("frame", self.number.to_string()),
+            ("seed", self.seed.to_string()),
+            ("samples per pixel", self.spp.to_string()),
+            ("resolution", format!("{}x{}", self.resolution[0], self.resolution[1])),
+            ("pixels", format!("{},{},{},{}", min[0], max[0], min[1], max[1])),
+            ("channels", self.aovs.iter().map(film::Aov::name).collect::<Vec<_>>().join(",")),
+            ("filter", self.filtering.name().to_owned() + &filter.collect::<String>()),
+        ]
+    }
+
+    /// The first of [`Self::settings`] in which another frame differs: its name, and both values.
+    pub fn difference(&self, other: &Self) -> Option<(&'static str, String, String)> {
+        let mut pairs = self.settings().into_iter().zip(other.settings());
+        pairs.find_map(|((name, mine), (_, others))| (mine != others).then_some((name, mine, others)))
+    }
+}
+
+/// Numbers of samples: ranges without gaps between those that touch, in order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Samples(Vec<Range<u64>>);
+
+impl Samples {
+    /// Adds a range.
+    ///
+    /// # Errors
+    /// Some of its samples are there already: which.
+    pub fn insert(&mut self, range: Range<u64>) -> Result<(), Range<u64>> {
+        if range.is_empty() {
+            return Ok(());
+        }
+        let at = self.0.partition_point(|known| known.end <= range.start);
+        if let Some(known) = self.0.get(at).filter(|known| known.start < range.end) {
+            return Err(known.start.max(range.start)..known.end.min(range.end));
+        }
+        self.0.insert(at, range);
+        self.0.dedup_by(|next, kept| {
+            let touch = kept.end == next.start;
+            if touch {
+                kept.end = next.end;
+            }
+            touch
+        });
+        Ok(())
+    }
+
+    /// The ranges, in order.
+    pub fn ranges(&self) -> &[Range<u64>] {
+        &self.0
+    }
+
+    /// Number of samples.
+    pub fn count(&self) -> u64 {
+        self.0.iter().map(|range| range.end - range.start).sum()
+    }
+
+    /// The first samples of `whole` that are not there; empty if all are.
+    pub fn missing(&self, whole: &Range<u64>) -> Range<u64> {
+        let start = self.0.iter().fold(whole.start, |next, range| if range.contains(&next) { range.end } else { next });
+        let end = self.0.iter().map(|range| range.start).find(|begin| *begin >= start).unwrap_or(whole.end);
+        start.min(whole.end)..end.min(whole.end).max(start.min(whole.end))
+    }
+}
+
+impl fmt::Display for Samples {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ranges: Vec<String> = self.0.iter().map(|range| format!("{}:{}", range.start, range.end)).collect();
+        f.write_str(&ranges.join(","))
+    }
+}
+
+/// A frame with the samples that were taken so far.
+pub struct Accumulation {
+    /// What it is.
+    pub description: FrameDescription,
+    /// All sums of pixels.
+    pub film: Film,
+    /// All sums of the filter.
+    pub filter: Option<FrameFilter>,
+    /// The samples of each pixel that were taken.
+    pub samples: Samples,
+    /// Rays, and samples that were rejected.
+    pub counters: Counters,
+}
+
+impl Accumulation {
+    /// No sample yet.
+    ///
+    /// # Panics
+    /// If the filter's settings are not valid, which is checked when a job is prepared.
+    pub fn new(description: FrameDescription) -> Self {
+        let filtered = description.filtering != Filtering::None;
+        let film = Film::new(description.resolution, description.bounds, description.aovs, filtered);
+        let filter = FrameFilter::new(&description.filtering, &description.surroundings, &film)
+            .expect("the settings of a frame's filter are valid");
+        Self { description, film, filter, samples: Samples::default(), counters: Counters::default() }
+    }
+
+    /// Whether the samples that were asked for are there.
+    pub fn complete(&self) -> bool {
+        self.samples.missing(&self.description.asked).is_empty()
+    }
+
+    /// The first of the passes over the whole frame into which samples `rest` are cut.
+    pub fn pass(&self, rest: &Range<u64>) -> Range<u64> {
+        match &self.filter {
+            Some(filter) => filter.block(rest),
+            None => pass(rest, rest.start - self.description.asked.start, self.description.bounds.area()),
+        }
+    }
+
+    /// Gives the film its filtered values, as of now. Nothing is lost: more samples may follow.
+    pub fn develop(&mut self) -> Option<filtering::Report> {
+        self.filter.as_mut().map(|filter| filter.develop(&self.description.surroundings, &mut self.film))
+    }
+
+    /// Bytes of the sums of pixels.
+    pub fn film_bytes(&self) -> u64 {
+        Film::memory(self.description.bounds, self.description.aovs, self.filter.is_some())
+    }
+}
+
+/// The next pass of samples `rest` when `done` are done: short ones first, so that a job that is stopped early has something,
+/// then as long as [`PASS_SPP`] and [`PASS_PATHS`] let them. Where they are cut changes no bit.
+fn pass(rest: &Range<u64>, done: u64, pixels: u64) -> Range<u64> {
+    let longest = (PASS_PATHS / pixels.max(1)).clamp(1, PASS_SPP);
+    rest.start..rest.end.min(rest.start.saturating_add(done.clamp(1, longest)))
+}
+
+/// The longest pass, in samples per pixel: so that the threads seldom wait for each other.
+const PASS_SPP: u64 = 16;
+
+/// Paths of a pass: a few seconds of work on two cores, so that a job that is asked to stop does.
+const PASS_PATHS: u64 = 1 << 21;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_grow_up_to_a_limit() {
+        let lengths = |count, pixels| {
+            let (mut rest, mut lengths) = (0..count, Vec::new());
+            while !rest.is_empty() {
+                let pass = pass(&rest, rest.start, pixels);
+                lengths.push(pass.end - pass.start);
+                rest.start = pass.end;
+            }
+            lengths
+        };
+        assert_eq!(lengths(45, 1 << 16), [1, 1, 2, 4, 8, 16, 13]);
+        assert_eq!(lengths(9, 1 << 19), [1, 1, 2, 4, 1]);
+        assert_eq!(lengths(3, 1 << 30), [1, 1, 1]);
+        assert_eq!(pass(&(u64::MAX - 1..u64::MAX), 50, 1), u64::MAX - 1..u64::MAX);
+    }
+
+    #[test]
+    fn ranges_join_and_never_overlap() {
+        let mut samples = Samples::default();
+        for range in [4..8, 12..16, 0..4, 20..20] {
+            samples.insert(range).unwrap();
+        }
+        assert_eq!(samples.ranges(), [0..8, 12..16]);
+        assert_eq!((samples.count(), samples.to_string()), (12, "0:8,12:16".into()));
+        assert_eq!(samples.insert(6..14), Err(6..8));
+        assert_eq!(samples.insert(10..14), Err(12..14));
+        assert_eq!(samples.missing(&(0..16)), 8..12);
+        assert_eq!(samples.missing(&(0..20)), 8..12);
+        samples.insert(8..12).unwrap();
+        assert_eq!(samples.ranges(), std::slice::from_ref(&(0..16)));
+        assert!(samples.missing(&(0..16)).is_empty() && samples.missing(&(3..9)).is_empty());
+        assert_eq!(samples.missing(&(0..20)), 16..20);
+        assert_eq!(Samples::default().missing(&(2..5)), 2..5);
+    }
+}
