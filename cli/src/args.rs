@@ -11,6 +11,10 @@ use renderer::film::AovSet;
 
 use crate::exit;
 
+mod study;
+
+pub use study::StudyArguments;
+
 /// Renders pbrt-v4 scenes by path tracing.
 #[derive(Debug, Parser)]
 #[command(name = "tessera", version, max_term_width = 100, after_help = exit::HELP, arg_required_else_help = true)]
@@ -35,6 +39,8 @@ pub enum Command {
     Compare(CompareArguments),
     /// Turn an image into a PNG for looking at
     Preview(PreviewArguments),
+    /// Measure what time buys: a scene over budgets and settings, as one page
+    Study(StudyArguments),
 }
 
 /// Options of every command.

@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use renderer::filtering::Filtering;
+use renderer::render::RenderError;
+use renderer::scene::Severity;
 
-use crate::args::{FilterArguments, RenderArguments};
+use crate::args::{FilterArguments, FilterKind, RenderArguments};
 use crate::exit::Failure;
 use crate::frame_name;
+use crate::log::Log;
 
 /// This program and its version, for the metadata of files.
 pub fn software() -> String {
@@ -68,13 +71,43 @@ pub fn filtering(arguments: &FilterArguments) -> Result<Filtering, Failure> {
                 .into(),
         ));
     }
-    let mut filtering = Filtering::named(arguments.filter.name()).expect("every kind of the command line has a filter");
+    filter(arguments.filter, &arguments.filter_set)
+}
+
+/// A filter with settings.
+///
+/// # Errors
+/// Settings that the filter does not have or does not take.
+pub fn filter(kind: FilterKind, set: &[(String, String)]) -> Result<Filtering, Failure> {
+    let mut filtering = Filtering::named(kind.name()).expect("every kind of the command line has a filter");
     let usage = |error: renderer::filtering::SettingError| Failure::Usage(format!("--filter-set: {error}"));
-    for (key, value) in &arguments.filter_set {
+    for (key, value) in set {
         filtering.set(key, value).map_err(usage)?;
     }
     filtering.validate().map_err(usage)?;
     Ok(filtering)
+}
+
+/// Shows all that is wrong with a scene, and says what that means for the command.
+pub fn scene_failure(error: &RenderError, log: &Log) -> Failure {
+    match error {
+        RenderError::Scene(diagnostics) | RenderError::Compile(diagnostics) => {
+            for diagnostic in diagnostics {
+                match diagnostic.severity {
+                    Severity::Warning => log.warning(&diagnostic.to_string()),
+                    Severity::Error => log.diagnostic(&diagnostic.to_string()),
+                }
+            }
+            Failure::Input(error.to_string())
+        }
+        RenderError::Embree(_)
+        | RenderError::OpenImageIo(_)
+        | RenderError::Threads { .. }
+        | RenderError::Memory { .. }
+        | RenderError::EmptySampleRange(_)
+        | RenderError::TooManySamples(_)
+        | RenderError::Filter(_) => Failure::Render(error.to_string()),
+    }
 }
 
 /// How many threads to run: what was typed; else what Slurm gave the task; else what the affinity mask and the control

@@ -22,6 +22,7 @@ mod sanitise;
 mod significance;
 mod ssim;
 mod stats;
+mod study;
 mod tone;
 
 use std::panic::{self, AssertUnwindSafe};

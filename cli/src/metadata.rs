@@ -44,7 +44,7 @@ pub fn of_frame(frame: &Frame, provenance: bool) -> Vec<(String, Attribute)> {
 const REC709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 
 /// A filter as the image's metadata name it: its name and all its settings.
-fn filter_settings(filtering: &Filtering) -> String {
+pub fn filter_settings(filtering: &Filtering) -> String {
     let settings = filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
     filtering.name().to_owned() + &settings.collect::<String>()
 }

@@ -222,6 +222,20 @@ pub fn resident_memory() -> Option<u64> {
     status("VmRSS:")
 }
 
+/// Seconds that all processors have spent on this process so far; 0 if the system does not say.
+pub fn processor_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    parse_processor_seconds(&text).unwrap_or(0.0)
+}
+
+/// Of `/proc/PID/stat`, fields 14 and 15, in hundredths of a second: proc(5). The name before them may hold anything, but
+/// ends with the last parenthesis.
+fn parse_processor_seconds(text: &str) -> Option<f64> {
+    let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let mut ticks = || fields.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / 100.0)
+}
+
 fn status(key: &str) -> Option<u64> {
     parse_status(&std::fs::read_to_string("/proc/self/status").ok()?, key)
 }
@@ -244,5 +258,13 @@ mod tests {
         assert_eq!(parse_status(text, "VmRSS:"), None);
         assert_eq!(parse_status(text, "VmSwap:"), None);
         assert!(peak_memory() >= resident_memory());
+    }
+
+    #[test]
+    fn processor_time_is_user_and_system() {
+        let text = "7 (a b) c) S 1 7 7 0 -1 4194560 1 2 3 4 250 50 0 0 20 0 1 0 9 8";
+        assert_eq!(parse_processor_seconds(text), Some(3.0));
+        assert_eq!(parse_processor_seconds("7"), None);
+        assert!(processor_seconds() >= 0.0);
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use renderer::film::Film;
 use renderer::render::{self, Job, Observer, RenderError};
-use renderer::scene::{Diagnostic, Severity, pbrt};
+use renderer::scene::{Diagnostic, pbrt};
 use serde::Serialize;
 
 use super::print;
@@ -64,12 +64,12 @@ struct Memory {
 pub fn run(arguments: &InfoArguments, log: &Log) -> Result<(), Failure> {
     let (inventory, read_warnings) = match pbrt::load(&arguments.scene) {
         Ok((scene, warnings)) => (Inventory::of(&scene), warnings),
-        Err(diagnostics) => return Err(failure(&RenderError::Scene(diagnostics), log)),
+        Err(diagnostics) => return Err(job::scene_failure(&RenderError::Scene(diagnostics), log)),
     };
     let (built, warnings) = if arguments.parse_only {
         (None, read_warnings)
     } else {
-        let (built, warnings) = build(arguments).map_err(|error| failure(&error, log))?;
+        let (built, warnings) = build(arguments).map_err(|error| job::scene_failure(&error, log))?;
         (Some(built), warnings)
     };
     let warnings = warnings.iter().map(ToString::to_string).collect();
@@ -115,27 +115,6 @@ fn build(arguments: &InfoArguments) -> Result<(Built, Vec<Diagnostic>), RenderEr
         },
     };
     Ok((built, observer.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)))
-}
-
-fn failure(error: &RenderError, log: &Log) -> Failure {
-    match error {
-        RenderError::Scene(diagnostics) | RenderError::Compile(diagnostics) => {
-            for diagnostic in diagnostics {
-                match diagnostic.severity {
-                    Severity::Warning => log.warning(&diagnostic.to_string()),
-                    Severity::Error => log.diagnostic(&diagnostic.to_string()),
-                }
-            }
-            Failure::Input(error.to_string())
-        }
-        RenderError::Embree(_)
-        | RenderError::OpenImageIo(_)
-        | RenderError::Threads { .. }
-        | RenderError::Memory { .. }
-        | RenderError::EmptySampleRange(_)
-        | RenderError::TooManySamples(_)
-        | RenderError::Filter(_) => Failure::Render(error.to_string()),
-    }
 }
 
 /// The report for people. Names come from the scene, so each stays on its line.

@@ -4,6 +4,7 @@ mod compare;
 mod info;
 mod preview;
 mod render;
+mod study;
 
 use std::io::{self, Write};
 
@@ -27,6 +28,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Info(arguments) => info::run(arguments, &log),
         Command::Compare(arguments) => compare::run(arguments, &log),
         Command::Preview(arguments) => preview::run(arguments, &log),
+        Command::Study(arguments) => study::run(arguments, &log),
     });
     result.inspect_err(|failure| log.error(&failure.to_string()))
 }

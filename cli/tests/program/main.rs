@@ -4,6 +4,7 @@ mod compare;
 mod info;
 mod preview;
 mod render;
+mod study;
 mod usage;
 
 use std::path::{Path, PathBuf};
