@@ -253,11 +253,33 @@ impl Adaptive {
     /// What each slot of each part gets from all paths so far; slots without a path are left out.
     pub fn resolve(&mut self) -> Vec<Vec<(u32, Resolved)>> {
         let estimates = self.estimates();
+        self.read(&estimates)
+    }
+
+    /// The same at the end, and what was done: gives memory back as it goes.
+    pub fn finish(mut self) -> (Vec<Vec<(u32, Resolved)>>, Report) {
+        let bytes = self.bytes();
+        self.second.clear();
+        let (mut cells, mut estimates) = (0, Vec::new());
+        for tree in 0..2 * self.grids.len() {
+            let (estimate, count) = estimate(&self.tables(tree), &self.quantum, &self.params.shrinkage);
+            estimates.push(estimate);
+            cells += count;
+            let (lobe, tree) = (tree / self.grids.len(), tree % self.grids.len());
+            self.parts.iter_mut().for_each(|part| part.cells[lobe][tree] = Table::default());
+        }
+        let resolved = self.read(&estimates);
+        self.cells = Some(cells);
+        (resolved, Report { bytes, ..self.report() })
+    }
+
+    /// What each slot gets, given the estimates.
+    fn read(&mut self, estimates: &[Vec<Vec<[f32; 3]>>]) -> Vec<Vec<(u32, Resolved)>> {
         let (quantum, trees) = (&self.quantum, self.grids.len());
         let resolve = |(at, part): (usize, &mut Part)| {
-            let read =
-                |lobe: PairLobe, tree: usize, cell: u32| estimates[lobe as usize * trees + tree][at][cell as usize];
-            part.pairs.resolve(quantum, read)
+            part.pairs.resolve(quantum, |lobe: PairLobe, tree: usize, cell: u32| {
+                estimates[lobe as usize * trees + tree][at][cell as usize]
+            })
         };
         self.parts.par_iter_mut().enumerate().map(resolve).collect()
     }
@@ -280,11 +302,15 @@ impl Adaptive {
         if self.cells.is_none() {
             self.estimates();
         }
+        let pairs = self.parts.iter().map(|part| part.pairs.len() as u64).sum();
+        Report { cells: self.cells.unwrap_or_default(), pairs, bytes: self.bytes(), ..self.report }
+    }
+
+    fn bytes(&self) -> u64 {
         let bytes = self.parts.iter().map(Part::bytes).sum::<usize>()
             + self.unread.iter().flatten().map(Table::bytes).sum::<usize>()
             + self.second.iter().map(|tree| tree.cells.bytes()).sum::<usize>();
-        let pairs = self.parts.iter().map(|part| part.pairs.len() as u64).sum();
-        Report { cells: self.cells.unwrap_or_default(), pairs, bytes: bytes as u64, ..self.report }
+        bytes as u64
     }
 }
 

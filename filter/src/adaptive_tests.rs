@@ -58,6 +58,15 @@ fn sums_of_epochs_add_up_in_any_order_to_the_bits_of_the_whole() {
 }
 
 #[test]
+fn what_is_left_at_the_end_is_what_was_there_before() {
+    let mut filter = filter();
+    add(&mut filter, 0..8);
+    let (resolved, report) = (filter.resolve(), filter.report());
+    assert!(report.cells > 0 && report.pairs > 0);
+    assert_eq!(filter.finish(), (resolved, report));
+}
+
+#[test]
 fn epochs_matter() {
     let mut cut = filter();
     add(&mut cut, 0..8);

@@ -139,6 +139,10 @@ impl Pairs {
         let mut of_slot = self.pairs[recent..].iter_mut().rev().take_while(|known| known.slot() == slot);
         let known = of_slot.find(|known| known.order() == pair.order());
         if !known.is_some_and(|known| known.absorb(&pair)) {
+            if self.pairs.len() == self.pairs.capacity() {
+                // By a quarter where doubling would waste half.
+                self.pairs.reserve_exact((self.pairs.len() / 4).max(64));
+            }
             self.pairs.push(pair);
         }
         true

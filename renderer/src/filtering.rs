@@ -10,7 +10,7 @@ mod tile;
 use std::ops::Range;
 
 use filter::talk::{self, Talk};
-use filter::{Adaptive, Anchor, PathRecord};
+use filter::{Adaptive, Anchor, PathRecord, Resolved};
 use glam::{Mat3, Vec3};
 
 pub use blend::Blend;
@@ -170,23 +170,48 @@ impl FrameFilter {
                 Report::Talk(talk.report())
             }
             Sharing::Adaptive(adaptive, blend) => {
-                let resolved = by_slot(film, adaptive.resolve());
-                let pixel = |at| blend::Pixel::new(film, at, &resolved[film.index(at)], expose);
-                let bounds = film.bounds();
-                let frame =
-                    blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
-                let mut values = frame.blend(blend);
-                let coarse = expose(Vec3::splat(self.coarse)).max_element();
-                // At the other end, sums of what fits singly need not fit.
-                let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
-                for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(value, _)| !usable(value)) {
-                    *value = film.pixel(at).mean().as_vec3();
-                }
-                film.set_filtered(&values);
+                let resolved = adaptive.resolve();
+                blend_into(film, resolved, blend, self.coarse, expose);
                 Report::Adaptive(adaptive.report())
             }
         }
     }
+
+    /// The same at the end: the filter's memory is given back before it is needed for the blend.
+    pub fn finish(mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
+        match self.sharing {
+            Sharing::Talk(..) => self.develop(surroundings, film),
+            Sharing::Adaptive(adaptive, blend) => {
+                let (resolved, report) = adaptive.finish();
+                blend_into(film, resolved, &blend, self.coarse, |radiance| surroundings.response * radiance);
+                Report::Adaptive(report)
+            }
+        }
+    }
+}
+
+/// Gives the film its filtered values from what each slot got.
+fn blend_into(
+    film: &mut Film,
+    resolved: Vec<Vec<(u32, Resolved)>>,
+    blend: &Blend,
+    coarse: f32,
+    expose: impl Fn(Vec3) -> Vec3,
+) {
+    let resolved = by_slot(film, resolved);
+    let pixel = |at| blend::Pixel::new(film, at, &resolved[film.index(at)], &expose);
+    let bounds = film.bounds();
+    let frame = blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
+    drop(resolved);
+    let mut values = frame.blend(blend);
+    drop(frame);
+    let coarse = expose(Vec3::splat(coarse)).max_element();
+    // At the other end, sums of what fits singly need not fit.
+    let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
+    for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(value, _)| !usable(value)) {
+        *value = film.pixel(at).mean().as_vec3();
+    }
+    film.set_filtered(&values);
 }
 
 /// How samples are cut into blocks: they do not cross epochs, and within an epoch borders are multiples of a length, so

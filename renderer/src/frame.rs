@@ -165,6 +165,11 @@ impl Accumulation {
         self.filter.as_mut().map(|filter| filter.develop(&self.description.surroundings, &mut self.film))
     }
 
+    /// The same when no more samples follow: takes less memory.
+    pub fn finish(&mut self) -> Option<filtering::Report> {
+        self.filter.take().map(|filter| filter.finish(&self.description.surroundings, &mut self.film))
+    }
+
     /// Bytes of the sums of pixels.
     pub fn film_bytes(&self) -> u64 {
         Film::memory(self.description.bounds, self.description.aovs, self.filter.is_some())

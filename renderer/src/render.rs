@@ -336,7 +336,7 @@ pub fn trace(
         }
     }
     let filtering = Instant::now();
-    statistics.filter = frame.develop();
+    statistics.filter = frame.finish();
     statistics.filter_seconds += filtering.elapsed().as_secs_f64();
     statistics.counters = frame.counters;
     statistics.render_seconds = start.elapsed().as_secs_f64();

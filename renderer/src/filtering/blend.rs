@@ -13,6 +13,7 @@
 
 use filter::Resolved;
 use glam::Vec3;
+use rayon::prelude::*;
 
 use crate::film::{Film, Layer};
 use crate::math::Rgb;
@@ -89,20 +90,22 @@ impl Frame {
         // Errors count relative to brightness, as eyes see them, down to a tenth of the mean.
         let scale =
             |pixel: &Pixel| luminance(pixel.base + pixel.glossy).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
-        let glossy = weights(&self.pixels, self.width, settings.glossy_doubt, settings.radius, |pixel| {
+        let glossy = weights(self, settings.glossy_doubt, settings.radius, |i| {
+            let pixel = &self.pixels[i];
             let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
             Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(pixel) }
         });
-        let filtered: Vec<Vec3> = (self.pixels.iter().zip(&glossy))
+        let filtered: Vec<Vec3> = (self.pixels.par_iter().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
-        let indexed: Vec<(Pixel, Vec3)> = self.pixels.iter().copied().zip(filtered.iter().copied()).collect();
-        let whole = weights(&indexed, self.width, settings.doubt, settings.radius, |(pixel, filtered)| Difference {
-            from_filtered: pixel.own - *filtered,
-            noise: pixel.own_noise,
-            scale: scale(pixel),
+        let whole = weights(self, settings.doubt, settings.radius, |i| {
+            let pixel = &self.pixels[i];
+            Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scale(pixel) }
         });
-        indexed.iter().zip(whole).map(|((pixel, filtered), w)| *filtered + w * (pixel.own - *filtered)).collect()
+        let blended = (&self.pixels, &filtered, &whole)
+            .into_par_iter()
+            .map(|(pixel, filtered, w)| *filtered + *w * (pixel.own - *filtered));
+        blended.collect()
     }
 }
 
@@ -136,34 +139,43 @@ impl Difference {
 }
 
 /// The unfiltered value's share for each pixel.
-fn weights<T>(pixels: &[T], width: usize, doubt: f32, radius: usize, measure: impl Fn(&T) -> Difference) -> Vec<f32> {
-    let differences: Vec<Difference> = pixels.iter().map(measure).collect();
+fn weights(frame: &Frame, doubt: f32, radius: usize, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
+    let width = frame.width;
+    let differences: Vec<Difference> = (0..frame.pixels.len()).into_par_iter().map(&measure).collect();
     let measured: Vec<[f32; 4]> = (0..differences.len())
+        .into_par_iter()
         .map(|i| {
             let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
             let [error, variance] = differences[i].errors(&differences[neighbour]);
             [error, error * error, variance, 1.0]
         })
         .collect();
-    let share = |&[errors, squares, variances, n]: &[f32; 4]| {
+    drop(differences);
+    let share = |[errors, squares, variances, n]: [f32; 4]| {
         let (error, variance) = (errors / n, variances / n);
         let standard_error = ((squares / n - error * error) / n).max(0.0).sqrt();
         let certain = error - doubt * standard_error;
         if certain > 0.0 { certain / (certain + variance) } else { 0.0 }
     };
-    windows(&measured, width, radius).iter().map(share).collect()
+    windows(measured, width, radius, share)
 }
 
-/// Sums over windows, smaller at the borders.
-fn windows<const N: usize>(values: &[[f32; N]], width: usize, radius: usize) -> Vec<[f32; N]> {
+/// What `of` makes of sums over windows, smaller at the borders.
+fn windows<const N: usize>(
+    values: Vec<[f32; N]>,
+    width: usize,
+    radius: usize,
+    of: impl Fn([f32; N]) -> f32 + Sync,
+) -> Vec<f32> {
     let height = values.len() / width.max(1);
     let near = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
     let sum = |a: [f32; N], b: &[f32; N]| std::array::from_fn(|i| a[i] + b[i]);
-    let rows: Vec<[f32; N]> = (0..values.len())
-        .map(|i| near(i % width, width).map(|x| &values[i / width * width + x]).fold([0.0; N], sum))
-        .collect();
+    let all = (0..values.len()).into_par_iter();
+    let row = |i: usize| near(i % width, width).map(|x| &values[i / width * width + x]).fold([0.0; N], sum);
+    let rows: Vec<[f32; N]> = all.clone().map(row).collect();
+    drop(values);
     let columns = |i: usize| near(i / width, height).map(move |y| y * width + i % width);
-    (0..values.len()).map(|i| columns(i).map(|at| &rows[at]).fold([0.0; N], sum)).collect()
+    all.map(|i| of(columns(i).map(|at| &rows[at]).fold([0.0; N], sum))).collect()
 }
 
 fn luminance(rgb: Vec3) -> f32 {
