@@ -8,7 +8,9 @@ use std::time::Duration;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use renderer::film::AovSet;
+use renderer::render::Slice;
 
+use crate::checkpoint::Interval;
 use crate::exit;
 
 mod study;
@@ -35,6 +37,8 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Say what a scene contains and what it takes to render it
     Info(InfoArguments),
+    /// Add parts of a frame's samples up to the frame
+    Merge(MergeArguments),
     /// Measure how far an image is from a reference
     Compare(CompareArguments),
     /// Turn an image into a PNG for looking at
@@ -66,8 +70,11 @@ Examples:
   Frame 12 of a shot, with the channels that denoisers and compositors want:
     tessera render shot.0012.pbrt -o out/shot.####.exr --frame 12 --aov albedo,N,depth
 
-  Slice 2 of 4 of a frame, for a farm that merges samples afterwards:
-    tessera render shot.pbrt -o out/shot.s1.exr --spp 1024 --sample-range 256:512 --progress alf
+  The second of four slices of a frame's samples, to be added to the others by \"tessera merge\":
+    tessera render shot.pbrt -o out/shot.1.part --spp 1024 --slice 1/4 --progress alf
+
+  A long frame on a machine that may die; the same command goes on from where it was:
+    tessera render shot.pbrt -o shot.exr --spp 4096 --checkpoint shot.checkpoint --checkpoint-interval 10m
 
   As good as ten minutes allow:
     tessera render shot.pbrt -o shot.exr --spp 100000 --time-limit 10m
@@ -80,8 +87,9 @@ The same scene, seed and samples give the same file, byte for byte, on any numbe
 the number of samples depend on the machine. The file appears under its name only when it is complete. Its date is that \
 of the environment variable SOURCE_DATE_EPOCH, else 1970; --provenance writes the real one.
 
-SIGINT (Ctrl-C) and SIGTERM end the render after the current pass over the frame: the image is written with the \
-samples so far, its metadata says tessera/complete = 0, and the exit code is 75. A second signal ends the program at once.
+SIGINT (Ctrl-C) and SIGTERM end the render after the current pass over the frame: checkpoint and image are written with \
+the samples so far, the image's metadata says tessera/complete = 0, and the exit code is 75. A second signal ends the \
+program at once. SIGHUP and SIGUSR1 write checkpoint and image of the samples so far, and the render goes on.
 
 Standard output carries lines for machines only (--progress), standard error lines for people.";
 
@@ -91,7 +99,7 @@ Standard output carries lines for machines only (--progress), standard error lin
 pub struct RenderArguments {
     /// The scene, a pbrt-v4 file
     pub scene: PathBuf,
-    /// The image to write, *.exr. #### or %04d in its name become the frame number
+    /// The image to write, *.exr, or *.part for "tessera merge". #### or %04d in its name become the frame number
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Number of the frame, for the output's name; the seed is mixed with it [default: 1, and the seed as it is]
@@ -110,9 +118,42 @@ pub struct RenderArguments {
     /// What is written.
     #[command(flatten)]
     pub channels: ChannelArguments,
+    /// What is kept on the way.
+    #[command(flatten)]
+    pub checkpoint: CheckpointArguments,
     /// How it runs.
     #[command(flatten)]
     pub run: RunArguments,
+}
+
+/// What is kept on the way.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Checkpoints")]
+pub struct CheckpointArguments {
+    /// Store the sums so far in this file now and then, and when stopped; deleted when the output is complete
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// How often: 5m, 100s, or 16p for every 16 passes over the frame
+    #[arg(long, value_name = "TIME", value_parser = interval, default_value = "5m", requires = "checkpoint")]
+    pub checkpoint_interval: Interval,
+    /// Whether to go on from the checkpoint
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t, requires = "checkpoint")]
+    pub resume: Resume,
+    /// Do nothing if the output is there and complete
+    #[arg(long)]
+    pub skip_existing: bool,
+}
+
+/// Whether to go on from a checkpoint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Resume {
+    /// If there is one of this frame
+    #[default]
+    Auto,
+    /// Never: render from the start
+    Never,
+    /// Always: without one, fail
+    Require,
 }
 
 /// How good the picture gets.
@@ -125,6 +166,9 @@ pub struct QualityArguments {
     /// Take only samples A to B - 1 of each pixel
     #[arg(long, value_name = "A:B", value_parser = sample_range)]
     pub sample_range: Option<Range<u64>>,
+    /// Take slice I of N of the samples, I from 0: what filtered samples share stays within slices
+    #[arg(long, value_name = "I/N", value_parser = slice, conflicts_with = "sample_range")]
+    pub slice: Option<Slice>,
     /// Seed of the random numbers [default: the scene's]
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -321,6 +365,36 @@ pub struct CompareArguments {
     pub max_block_difference: Option<f64>,
 }
 
+/// Options of `merge`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Parts are what \"tessera render --slice I/N -o NAME.part\" writes, on any machines. Added in any order they give, bit for \
+bit, the image that one machine renders in one run. Parts of different pictures, samples that two parts have, and samples \
+that none has are refused.
+
+Example:
+  for i in 0 1 2 3; do tessera render shot.pbrt --spp 64 --slice $i/4 -o shot.$i.part; done
+  tessera merge shot.*.part -o shot.exr
+
+Exit codes: 0 the output is complete; 3 a part cannot be read or does not fit the others; 4 the output cannot be written")]
+pub struct MergeArguments {
+    /// The parts
+    #[arg(required = true, value_name = "PART")]
+    pub parts: Vec<PathBuf>,
+    /// What to write: *.exr for the image, *.part for one part in place of several
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Make an image of what there is even if samples are missing
+    #[arg(long)]
+    pub partial: bool,
+    /// Record host, date and memory in the image: files then differ from run to run
+    #[arg(long)]
+    pub provenance: bool,
+    /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    pub threads: usize,
+}
+
 /// Options of `preview`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "\
@@ -384,6 +458,26 @@ fn sample_range(text: &str) -> Result<Range<u64>, String> {
         return Err(format!("{start}:{end} holds no sample: the end must be above the start"));
     }
     Ok(start..end)
+}
+
+fn slice(text: &str) -> Result<Slice, String> {
+    let wrong = || "expected slice/slices, such as 0/4 for the first of four".to_owned();
+    let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+    let (index, count) = (index.parse().map_err(|_| wrong())?, count.parse().map_err(|_| wrong())?);
+    if index >= count {
+        return Err(format!("there is no slice {index} of {count}: they count from 0"));
+    }
+    Ok(Slice { index, count })
+}
+
+fn interval(text: &str) -> Result<Interval, String> {
+    if let Some(passes) = text.strip_suffix('p') {
+        let passes = passes.parse().ok().filter(|passes| *passes > 0);
+        return passes
+            .map(Interval::Passes)
+            .ok_or_else(|| "expected a number of passes above 0, such as 16p".to_owned());
+    }
+    duration(text).map(Interval::Time)
 }
 
 fn duration(text: &str) -> Result<Duration, String> {
@@ -468,6 +562,11 @@ mod tests {
         for bad in ["", "5", "5:5", "6:5", ":5", "5:", "-1:5", "0:x"] {
             assert!(sample_range(bad).is_err(), "{bad}");
         }
+        assert_eq!(slice("1/4"), Ok(Slice { index: 1, count: 4 }));
+        assert!(["4/4", "1", "-1/2", "0/0", "a/b"].iter().all(|bad| slice(bad).is_err()));
+        assert_eq!(interval("16p"), Ok(Interval::Passes(16)));
+        assert_eq!(interval("1.5m"), Ok(Interval::Time(Duration::from_secs(90))));
+        assert!(["0p", "p", "x", "-1p"].iter().all(|bad| interval(bad).is_err()));
         assert_eq!(crop("0.25, 0.75,0,1"), Ok([0.25, 0.75, 0.0, 1.0]));
         for bad in ["0,1,0", "0,1,0,1.1", "0.5,0.5,0,1", "1,0,0,1", "nan,1,0,1", "a,b,c,d"] {
             assert!(crop(bad).is_err(), "{bad}");

@@ -21,12 +21,17 @@ pub fn software() -> String {
 /// # Errors
 /// The name is not that of an OpenEXR file.
 pub fn output(arguments: &RenderArguments) -> Result<PathBuf, Failure> {
-    require_extension(
-        &arguments.output,
-        "exr",
-        "a render is written as OpenEXR; \"tessera preview\" makes a PNG of it",
-    )?;
+    if !is_part(&arguments.output) {
+        let why =
+            "a render is written as OpenEXR, or with .part for \"tessera merge\"; \"tessera preview\" makes a PNG";
+        require_extension(&arguments.output, "exr", why)?;
+    }
     Ok(named(&arguments.output, arguments.frame.unwrap_or(1)))
+}
+
+/// Whether a file is to hold sums instead of an image.
+pub fn is_part(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("part"))
 }
 
 /// The name of an output of frame `frame`.
@@ -106,6 +111,7 @@ pub fn scene_failure(error: &RenderError, log: &Log) -> Failure {
         | RenderError::Memory { .. }
         | RenderError::EmptySampleRange(_)
         | RenderError::TooManySamples(_)
+        | RenderError::Slice { .. }
         | RenderError::Filter(_) => Failure::Render(error.to_string()),
     }
 }

@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod checkpoint;
 mod commands;
 mod exit;
 mod flip;

@@ -4,7 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use oiio::Attribute;
 use renderer::filtering::Filtering;
-use renderer::frame::{FrameDescription, Samples};
+use renderer::frame::{Accumulation, FrameDescription, Samples};
 use renderer::render::Frame;
 
 use crate::{job, stats};
@@ -12,7 +12,20 @@ use crate::{job, stats};
 /// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
 /// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
 pub fn of_frame(frame: &Frame, provenance: bool) -> Vec<(String, Attribute)> {
-    let (description, samples) = (&frame.description, &frame.samples);
+    let mut attributes = of_samples(&frame.description, &frame.samples);
+    if provenance {
+        add_provenance(&mut attributes, frame);
+    }
+    attributes
+}
+
+/// The metadata of an image that more samples will follow.
+pub fn of_accumulation(frame: &Accumulation) -> Vec<(String, Attribute)> {
+    of_samples(&frame.description, &frame.samples)
+}
+
+fn of_samples(description: &FrameDescription, samples: &Samples) -> Vec<(String, Attribute)> {
+    let complete = samples.missing(&description.asked).is_empty();
     let text = |text: String| Attribute::Text(text);
     let mut attributes = vec![
         ("Software".into(), text(job::software())),
@@ -26,16 +39,13 @@ pub fn of_frame(frame: &Frame, provenance: bool) -> Vec<(String, Attribute)> {
         ("tessera/frame".into(), Attribute::Int(description.number)),
         ("tessera/sampleRange".into(), text(samples.to_string())),
         ("tessera/filter".into(), text(filter_settings(&description.filtering))),
-        ("tessera/complete".into(), Attribute::Int(frame.complete().into())),
+        ("tessera/complete".into(), Attribute::Int(complete.into())),
         ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
         ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(description)))),
     ];
     if let Some(ndc_from_world) = description.ndc_from_world {
         let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
         attributes.push(("worldtoNDC".into(), matrix));
-    }
-    if provenance {
-        add_provenance(&mut attributes, frame);
     }
     attributes
 }

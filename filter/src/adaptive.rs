@@ -4,13 +4,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::first::{Batch, Part, Rules};
-use crate::grid::{Anchor, CellKey, Grid, LeafCell, Place};
-use crate::pairs::{Lobe as PairLobe, Pair};
+use crate::grid::{Anchor, Grid, LeafCell, Place};
+use crate::pairs::Lobe as PairLobe;
 use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shards::{ShardedIndex, ShardedTable};
 use crate::shrink::{Shrinkage, estimate};
-use crate::snapshot::{Snapshot, SnapshotError};
-use crate::sums::{LUMINANCE, Quantum, WideSums};
+use crate::sums::{LUMINANCE, Quantum};
 use crate::table::Table;
 
 /// Settings. The defaults are measured, not derived.
@@ -77,9 +76,9 @@ pub struct Report {
 
 /// A tree of cells of second vertices.
 #[derive(Debug)]
-struct Tree {
+pub(crate) struct Tree {
     grid: Grid,
-    cells: ShardedTable,
+    pub cells: ShardedTable,
 }
 
 /// The grids of several trees.
@@ -101,15 +100,13 @@ pub struct Adaptive {
     quantum: Quantum,
     /// Of first vertices, in both lobes.
     grids: Vec<Grid>,
-    second: Vec<Tree>,
-    parts: Vec<Part>,
-    /// Cells of other filters that no slot reads.
-    unread: [Vec<Table<LeafCell>>; 2],
+    pub(crate) second: Vec<Tree>,
+    pub(crate) parts: Vec<Part>,
     /// Number of the current epoch, once there is one.
     epoch: Option<u64>,
     /// Different cells at the first vertex, once they were counted.
     cells: Option<u64>,
-    report: Report,
+    pub(crate) report: Report,
 }
 
 impl Adaptive {
@@ -128,7 +125,6 @@ impl Adaptive {
                 .map(|grid| Tree { grid, cells: ShardedTable::default() })
                 .collect(),
             parts: (0..parts).map(|_| Part::new(params.trees as usize)).collect(),
-            unread: Part::new(params.trees as usize).cells,
             epoch: None,
             cells: None,
             report: Report::default(),
@@ -184,70 +180,10 @@ impl Adaptive {
         parts.par_iter().zip(&places).map(|(records, places)| places.read(records, &estimates)).collect()
     }
 
-    /// The tables of the first vertices' tree, diffuse and then glossy, by part; last, those that no slot reads.
+    /// The tables of the first vertices' tree, diffuse and then glossy, by part.
     fn tables(&self, tree: usize) -> Vec<&Table<LeafCell>> {
         let (lobe, tree) = (tree / self.grids.len(), tree % self.grids.len());
-        let parts = self.parts.iter().map(|part| &part.cells);
-        parts.chain([&self.unread]).map(|cells| &cells[lobe][tree]).collect()
-    }
-
-    /// All sums so far, the same whoever met which cell first.
-    pub fn snapshot(&mut self) -> Snapshot {
-        let trees = 2 * self.grids.len();
-        let mut snapshot = Snapshot { paths: [self.report.paths, self.report.unfiltered], ..Snapshot::default() };
-        let mut numbers = Vec::new();
-        for tree in 0..trees {
-            let (cells, number) = merged(&self.tables(tree));
-            snapshot.trees.push(cells);
-            numbers.push(number);
-        }
-        for (at, part) in self.parts.iter_mut().enumerate() {
-            let (pairs, own) = part.pairs.parts();
-            let mut pairs: Vec<Pair> =
-                pairs.iter().map(|pair| pair.with_cell(numbers[pair.tree_of(trees)][at][pair.index()])).collect();
-            pairs.sort_unstable_by_key(Pair::order);
-            snapshot.pairs.push(pairs);
-            snapshot.own.push(own.to_vec());
-        }
-        snapshot
-    }
-
-    /// Adds the sums of another filter over the same frame. Exact: the order of additions does not count.
-    ///
-    /// # Errors
-    /// The other has other trees or parts; then nothing was added.
-    pub fn absorb(&mut self, other: &Snapshot) -> Result<(), SnapshotError> {
-        let trees = 2 * self.grids.len();
-        let parts = self.parts.len();
-        if other.trees.len() != trees || other.pairs.len() != parts || other.own.len() != parts {
-            return Err(SnapshotError::Mismatch);
-        }
-        // The first part that reads a cell takes its sums.
-        let mut taken: Vec<Vec<bool>> = other.trees.iter().map(|cells| vec![false; cells.len()]).collect();
-        for ((part, pairs), own) in self.parts.iter_mut().zip(&other.pairs).zip(&other.own) {
-            let Part { cells, pairs: mine } = part;
-            let read = pairs.iter().map(|pair| {
-                let (tree, at) = (pair.tree_of(trees), pair.index());
-                let (key, sums) = &other.trees[tree][at];
-                let table = &mut cells[tree / (trees / 2)][tree % (trees / 2)];
-                let cell = table.cell((*key).into());
-                if !std::mem::replace(&mut taken[tree][at], true) {
-                    table.merge(cell, sums);
-                }
-                pair.with_cell(cell)
-            });
-            mine.absorb(read, own);
-        }
-        for ((table, cells), taken) in self.unread.iter_mut().flatten().zip(&other.trees).zip(&taken) {
-            for ((key, sums), _) in cells.iter().zip(taken).filter(|(_, taken)| !**taken) {
-                let cell = table.cell((*key).into());
-                table.merge(cell, sums);
-            }
-        }
-        self.report.paths += other.paths[0];
-        self.report.unfiltered += other.paths[1];
-        self.cells = None;
-        Ok(())
+        self.parts.iter().map(|part| &part.cells[lobe][tree]).collect()
     }
 
     /// What each slot of each part gets from all paths so far; slots without a path are left out.
@@ -297,6 +233,11 @@ impl Adaptive {
         estimates
     }
 
+    /// Says that cells have come.
+    pub(crate) fn cells_changed(&mut self) {
+        self.cells = None;
+    }
+
     /// What was done so far.
     pub fn report(&mut self) -> Report {
         if self.cells.is_none() {
@@ -308,30 +249,9 @@ impl Adaptive {
 
     fn bytes(&self) -> u64 {
         let bytes = self.parts.iter().map(Part::bytes).sum::<usize>()
-            + self.unread.iter().flatten().map(Table::bytes).sum::<usize>()
             + self.second.iter().map(|tree| tree.cells.bytes()).sum::<usize>();
         bytes as u64
     }
-}
-
-/// A tree's cells over all tables by key, and the numbers there of each table's cells.
-fn merged(tables: &[&Table<LeafCell>]) -> (Vec<(CellKey, WideSums)>, Vec<Vec<u32>>) {
-    let mut order: Vec<(CellKey, u32, u32)> = Vec::with_capacity(tables.iter().map(|table| table.len()).sum());
-    for (at, table) in (0..).zip(tables) {
-        order.extend(table.keys().zip(0..).map(|(key, cell)| (key, at, cell)));
-    }
-    order.par_sort_unstable();
-    let mut numbers: Vec<Vec<u32>> = tables.iter().map(|table| vec![0; table.len()]).collect();
-    let mut cells = Vec::new();
-    for same in order.chunk_by(|a, b| a.0 == b.0) {
-        let mut sums = WideSums::default();
-        for &(_, table, cell) in same {
-            sums.merge(&tables[table as usize].sums(cell));
-            numbers[table as usize][cell as usize] = cells.len() as u32;
-        }
-        cells.push((same[0].0, sums));
-    }
-    (cells, numbers)
 }
 
 /// The second vertices of a part of a block.

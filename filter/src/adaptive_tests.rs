@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::PackedRgb;
+use crate::{PackedRgb, StoredError};
 
 const ANCHOR: Anchor = Anchor { origin: DVec3::ZERO, extent: 8.0 };
 
@@ -38,6 +38,21 @@ fn add(filter: &mut Adaptive, samples: std::ops::Range<u64>) {
     }
 }
 
+/// The words of every part.
+fn stored(filter: &mut Adaptive) -> Vec<Vec<u64>> {
+    let part = |at| {
+        let mut words = Vec::new();
+        filter.store_part(at, &mut words);
+        words
+    };
+    (0..5).map(part).collect()
+}
+
+fn load(filter: &mut Adaptive, part: usize, words: &[u64]) -> Result<(), StoredError> {
+    let first = 16 * part as u32;
+    filter.load_part(part, first..first + 16, words)
+}
+
 #[test]
 fn sums_of_epochs_add_up_in_any_order_to_the_bits_of_the_whole() {
     let mut whole = filter();
@@ -47,12 +62,15 @@ fn sums_of_epochs_add_up_in_any_order_to_the_bits_of_the_whole() {
     for order in [[0, 2, 4, 6], [6, 2, 0, 4], [4, 6, 2, 0]] {
         let mut sum = filter();
         for epoch in order {
-            let mut part = filter();
-            add(&mut part, epoch..epoch + 2);
-            sum.absorb(&part.snapshot()).unwrap();
+            let mut slice = filter();
+            add(&mut slice, epoch..epoch + 2);
+            for (part, words) in stored(&mut slice).iter().enumerate() {
+                load(&mut sum, part, words).unwrap();
+            }
+            sum.add_paths(slice.paths());
         }
         assert_eq!(sum.resolve(), expected, "{order:?}");
-        assert_eq!(sum.snapshot(), whole.snapshot(), "{order:?}");
+        assert!(stored(&mut sum) == stored(&mut whole), "{order:?}");
         assert_eq!(sum.report().paths, whole.report().paths);
     }
 }
@@ -67,6 +85,24 @@ fn what_is_left_at_the_end_is_what_was_there_before() {
 }
 
 #[test]
+fn an_epoch_can_be_gone_on_with() {
+    let mut whole = Adaptive::new(&Params { epoch: 4, ..Params::default() }, &ANCHOR, 5);
+    let mut first = Adaptive::new(&Params { epoch: 4, ..Params::default() }, &ANCHOR, 5);
+    let mut second = Adaptive::new(&Params { epoch: 4, ..Params::default() }, &ANCHOR, 5);
+    add(&mut whole, 0..8);
+    add(&mut first, 0..3);
+    for (part, words) in stored(&mut first).iter().enumerate() {
+        load(&mut second, part, words).unwrap();
+    }
+    let mut words = Vec::new();
+    first.store_epoch(&mut words);
+    second.load_epoch(3, &words).unwrap();
+    add(&mut second, 3..8);
+    assert_eq!(second.resolve(), whole.resolve());
+    assert_eq!(filter().load_epoch(3, &words[1..]), Err(StoredError));
+}
+
+#[test]
 fn epochs_matter() {
     let mut cut = filter();
     add(&mut cut, 0..8);
@@ -76,26 +112,26 @@ fn epochs_matter() {
 }
 
 #[test]
-fn stored_sums_read_back() {
-    let mut filter = filter();
-    add(&mut filter, 0..4);
-    let snapshot = filter.snapshot();
-    let bytes = snapshot.to_bytes();
-    assert_eq!(Snapshot::from_bytes(&bytes), Ok(snapshot));
-    assert_eq!(Snapshot::from_bytes(&bytes[..bytes.len() / 2]), Err(SnapshotError::Truncated));
-    assert_eq!(Snapshot::from_bytes(b"PNG"), Err(SnapshotError::Truncated));
-    assert_eq!(Snapshot::from_bytes(&[b'x'; 64]), Err(SnapshotError::Foreign));
-    for at in (12..bytes.len()).step_by(211) {
-        let mut damaged = bytes.clone();
-        damaged[at] ^= 16;
-        assert!(Snapshot::from_bytes(&damaged).is_err(), "bit flipped in byte {at}");
+fn words_that_are_no_sums_are_refused() {
+    let mut whole = filter();
+    add(&mut whole, 0..4);
+    let words = &stored(&mut whole)[1];
+    assert_eq!(load(&mut filter(), 1, words), Ok(()));
+    assert_eq!(load(&mut filter(), 2, words), Err(StoredError), "slots of another part");
+    for end in (0..words.len()).step_by(97) {
+        assert_eq!(load(&mut filter(), 1, &words[..end]), Err(StoredError), "{end} words");
     }
-}
-
-#[test]
-fn sums_of_other_filters_are_refused() {
-    let other = Adaptive::new(&Params { trees: 3, ..Params::default() }, &ANCHOR, 5).snapshot();
-    assert_eq!(filter().absorb(&other), Err(SnapshotError::Mismatch));
-    let other = Adaptive::new(&Params::default(), &ANCHOR, 4).snapshot();
-    assert_eq!(filter().absorb(&other), Err(SnapshotError::Mismatch));
+    let other = Params { trees: 3, ..Params::default() };
+    assert_eq!(load(&mut Adaptive::new(&other, &ANCHOR, 5), 1, words), Err(StoredError), "three trees");
+    // Whatever the words are, nothing panics.
+    for at in 0..words.len() {
+        for value in [0, 1, u64::MAX, words[at] ^ 1 << 63] {
+            let mut wrong = words.clone();
+            wrong[at] = value;
+            let mut filter = filter();
+            if load(&mut filter, 1, &wrong).and_then(|()| load(&mut filter, 1, words)).is_ok() && at % 50 == 0 {
+                filter.resolve();
+            }
+        }
+    }
 }

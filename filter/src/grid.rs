@@ -70,9 +70,10 @@ impl CellKey {
         mix64(self.0 as u64 ^ mix64((self.0 >> 64) as u64))
     }
 
-    /// From [`Self::bits`].
-    pub fn from_bits(bits: u128) -> Self {
-        Self(bits)
+    /// From [`Self::bits`]; `None` where no cell has these: levels are exponents of f64.
+    pub fn from_bits(bits: u128) -> Option<Self> {
+        let key = Self(bits);
+        (key.level().abs() <= 1 << 12 && bits as u64 >> (3 * COORDINATE_BITS) == 0).then_some(key)
     }
 
     /// All bits.

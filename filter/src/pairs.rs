@@ -33,7 +33,7 @@ impl Pair {
         slot << (TREE_BITS + 1) | (lobe as u32) << TREE_BITS | tree
     }
 
-    fn slot(&self) -> u32 {
+    pub fn slot(&self) -> u32 {
         self.slot_lobe_tree >> (TREE_BITS + 1)
     }
 

@@ -154,14 +154,14 @@ impl WideSums {
         self.merge(&Self { count: 1, weight: deposit.weight, rgb, square: deposit.square });
     }
 
-    /// Adds other sums.
+    /// Adds other sums. What others have stored may be of any size.
     pub fn merge(&mut self, other: &Self) {
-        self.count += other.count;
-        self.weight += other.weight;
+        self.count = self.count.saturating_add(other.count);
+        self.weight = self.weight.saturating_add(other.weight);
         for (sum, x) in self.rgb.iter_mut().zip(other.rgb) {
-            *sum += x;
+            *sum = sum.saturating_add(x);
         }
-        self.square += other.square;
+        self.square = self.square.saturating_add(other.square);
     }
 }
 

@@ -10,7 +10,7 @@ mod tile;
 use std::ops::Range;
 
 use filter::talk::{self, Talk};
-use filter::{Adaptive, Anchor, PathRecord, Resolved};
+use filter::{Adaptive, Anchor, PathRecord, Resolved, StoredError};
 use glam::{Mat3, Vec3};
 
 pub use blend::Blend;
@@ -150,6 +150,59 @@ impl FrameFilter {
                 adaptive.begin_block(block.start);
                 adaptive.add(records);
             }
+        }
+    }
+
+    /// Appends the sums of a tile of the film.
+    pub fn store(&mut self, tile: usize, words: &mut Vec<u64>) {
+        if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
+            adaptive.store_part(tile, words);
+        }
+    }
+
+    /// Adds what [`Self::store`] appended for a tile with these pixels.
+    ///
+    /// # Errors
+    /// There are no such sums; some of them may have been added.
+    pub fn load(&mut self, tile: usize, pixels: Range<usize>, words: &[u64]) -> Result<(), StoredError> {
+        match &mut self.sharing {
+            Sharing::Adaptive(adaptive, _) => adaptive.load_part(tile, pixels.start as u32..pixels.end as u32, words),
+            Sharing::Talk(..) => Err(StoredError),
+        }
+    }
+
+    /// Appends what samples share with those after `next`, the next one; nothing between epochs.
+    pub fn store_epoch(&self, next: u64, words: &mut Vec<u64>) {
+        if let Sharing::Adaptive(adaptive, _) = &self.sharing {
+            if next % self.blocks.epoch != 0 {
+                adaptive.store_epoch(words);
+            }
+        }
+    }
+
+    /// Goes on with what [`Self::store_epoch`] appended.
+    ///
+    /// # Errors
+    /// As for [`Self::load`].
+    pub fn load_epoch(&mut self, next: u64, words: &[u64]) -> Result<(), StoredError> {
+        match &mut self.sharing {
+            Sharing::Adaptive(adaptive, _) if !words.is_empty() => adaptive.load_epoch(next, words),
+            _ => Ok(()),
+        }
+    }
+
+    /// Paths so far, and those of them that no cell could take.
+    pub fn paths(&self) -> [u64; 2] {
+        match &self.sharing {
+            Sharing::Adaptive(adaptive, _) => adaptive.paths(),
+            Sharing::Talk(..) => [0; 2],
+        }
+    }
+
+    /// Adds the counts of a filter whose sums were added.
+    pub fn add_paths(&mut self, paths: [u64; 2]) {
+        if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
+            adaptive.add_paths(paths);
         }
     }
 

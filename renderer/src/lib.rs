@@ -37,4 +37,5 @@ pub mod integrator;
 pub mod film;
 pub mod filtering;
 pub mod frame;
+pub mod part;
 pub mod render;

@@ -38,6 +38,8 @@ pub struct Job {
     pub pixel_bounds: Option<[i32; 4]>,
     /// The samples of each pixel to take; `None`: `0..spp`.
     pub sample_range: Option<Range<u64>>,
+    /// Take one of so many slices of the samples, which the filter's epochs bound; from 0.
+    pub slice: Option<Slice>,
     /// Threads that render; 0: as many as there are.
     pub threads: usize,
     /// Auxiliary outputs, besides those that the file asks for.
@@ -48,6 +50,31 @@ pub struct Job {
     pub techniques: Techniques,
     /// How the frame is filtered.
     pub filtering: Filtering,
+}
+
+/// One of several slices of a frame's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Slice {
+    /// Which, from 0.
+    pub index: u64,
+    /// How many.
+    pub count: u64,
+}
+
+impl Slice {
+    /// The samples of the slice, of `spp` in epochs that are not cut.
+    ///
+    /// # Errors
+    /// There are fewer epochs than slices, or there is no such slice.
+    fn samples(self, spp: u64, epoch: u64) -> Result<Range<u64>, RenderError> {
+        let Self { index, count } = self;
+        let epochs = spp.div_ceil(epoch);
+        if index >= count || count > epochs {
+            return Err(RenderError::Slice { slice: self, spp, epoch, epochs });
+        }
+        let border = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64 * epoch;
+        Ok(border(index)..border(index + 1).min(spp))
+    }
 }
 
 /// What a job is doing.
@@ -119,6 +146,21 @@ pub enum RenderError {
         size: [u32; 2],
         /// What its sums take.
         bytes: u64,
+    },
+    /// There is no such slice.
+    #[error(
+        "there is no slice {}/{}: slices count from 0, and {spp} samples that share by {epoch} make at most {epochs} slices; \
+         take fewer slices, more samples, or --filter-set epoch=N with a smaller N", slice.index, slice.count
+    )]
+    Slice {
+        /// The slice.
+        slice: Slice,
+        /// Samples of the frame.
+        spp: u64,
+        /// Samples that share.
+        epoch: u64,
+        /// So many times.
+        epochs: u64,
     },
     /// More than sums hold.
     #[error("{0} samples per pixel are more than one job can take, {most}; ask for fewer, or for a sample range", most = film::MOST_TERMS)]
@@ -203,7 +245,7 @@ pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> 
     let pool = thread_pool(job.threads)?;
     let prepared = pool.install(|| prepare(job, observer))?;
     check_memory(&prepared)?;
-    Ok(pool.install(|| trace(prepared, None, job.time_limit, observer)))
+    Ok(pool.install(|| trace(prepared, None, job.time_limit, observer).develop()))
 }
 
 /// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
@@ -243,8 +285,13 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     let seed = job.seed.unwrap_or(description.seed);
     let seed = if job.lock_seed { seed } else { job.frame.map_or(seed, |frame| seed_of_frame(seed, frame)) };
     let spp = job.spp.unwrap_or(description.spp).max(1);
-    let asked = job.sample_range.clone().unwrap_or(0..spp);
-    let spp = spp.max(asked.end);
+    let spp = job.sample_range.as_ref().map_or(spp, |range| spp.max(range.end));
+    job.filtering.validate()?;
+    let filtering = job.filtering.settled(spp);
+    let asked = match job.slice {
+        Some(slice) => slice.samples(spp, filtering.epoch())?,
+        None => job.sample_range.clone().unwrap_or(0..spp),
+    };
     if asked.is_empty() {
         return Err(RenderError::EmptySampleRange(asked));
     }
@@ -254,7 +301,6 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         _ if job.time_limit.is_some() => asked.start..asked.start + film::MOST_TERMS,
         count => return Err(RenderError::TooManySamples(count)),
     };
-    job.filtering.validate()?;
     let aovs = if description.film.gbuffer { AovSet::all() } else { job.aovs };
 
     observer.phase(Phase::Compile);
@@ -281,7 +327,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         resolution: world.sensor.resolution,
         bounds: world.sensor.bounds,
         aovs,
-        filtering: job.filtering.settled(spp),
+        filtering,
         surroundings: Surroundings {
             anchor: Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) },
             unit: 1.0,
@@ -319,7 +365,7 @@ pub fn trace(
     begun: Option<Accumulation>,
     time_limit: Option<Duration>,
     observer: &dyn Observer,
-) -> Frame {
+) -> Traced {
     observer.phase(Phase::Render);
     let start = Instant::now();
     let mut frame = begun.unwrap_or_else(|| Accumulation::new(prepared.description.clone()));
@@ -335,12 +381,36 @@ pub fn trace(
             trace_passes(&world, &queries, &mut frame, &mut statistics, observer, &over);
         }
     }
-    let filtering = Instant::now();
-    statistics.filter = frame.finish();
-    statistics.filter_seconds += filtering.elapsed().as_secs_f64();
     statistics.counters = frame.counters;
     statistics.render_seconds = start.elapsed().as_secs_f64();
-    Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
+    Traced { frame, statistics }
+}
+
+/// A frame whose samples are taken.
+pub struct Traced {
+    /// All that they added up to.
+    pub frame: Accumulation,
+    /// What it took.
+    pub statistics: Statistics,
+}
+
+impl Traced {
+    /// The frame with its sums alone, where nobody looks at an image.
+    pub fn undeveloped(self) -> Frame {
+        let Self { frame, statistics } = self;
+        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
+    }
+
+    /// The frame's image, filtered if it is to be.
+    pub fn develop(self) -> Frame {
+        let Self { mut frame, mut statistics } = self;
+        let start = Instant::now();
+        statistics.filter = frame.finish();
+        let seconds = start.elapsed().as_secs_f64();
+        statistics.filter_seconds += seconds;
+        statistics.render_seconds += seconds;
+        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
+    }
 }
 
 /// Traces all passes, filtered or not.
@@ -532,6 +602,24 @@ fn apply(job: &Job, description: &mut scene::Scene) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slices_are_whole_epochs_and_make_the_whole() {
+        for (spp, epoch) in [(16, 4), (30, 4), (7, 1), (64, 64), (1, 4), (u64::MAX, 8)] {
+            for count in [1, 2, 3, 7] {
+                let slices: Result<Vec<_>, _> =
+                    (0..count).map(|index| Slice { index, count }.samples(spp, epoch)).collect();
+                let Ok(slices) = slices else {
+                    assert!(spp.div_ceil(epoch) < count);
+                    continue;
+                };
+                assert_eq!((slices[0].start, slices[slices.len() - 1].end), (0, spp));
+                assert!(slices.iter().all(|slice| !slice.is_empty() && slice.start % epoch == 0));
+                assert!(slices.windows(2).all(|pair| pair[0].end == pair[1].start));
+            }
+        }
+        assert!(Slice { index: 2, count: 2 }.samples(16, 4).is_err());
+    }
 
     #[test]
     fn seeds_of_frames_differ() {

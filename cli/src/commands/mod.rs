@@ -2,6 +2,7 @@
 
 mod compare;
 mod info;
+mod merge;
 mod preview;
 mod render;
 mod study;
@@ -26,6 +27,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let result = log.open_file(arguments.log.log_file.as_deref()).and_then(|()| match &arguments.command {
         Command::Render(arguments) => render::run(arguments, &log),
         Command::Info(arguments) => info::run(arguments, &log),
+        Command::Merge(arguments) => merge::run(arguments, &log),
         Command::Compare(arguments) => compare::run(arguments, &log),
         Command::Preview(arguments) => preview::run(arguments, &log),
         Command::Study(arguments) => study::run(arguments, &log),

@@ -7,10 +7,13 @@ use std::time::Instant;
 use renderer::film::AovSet;
 use renderer::film::exr::{self, Losses};
 use renderer::filtering::Filtering;
+use renderer::frame::Accumulation;
+use renderer::part::{self, Part};
 use renderer::render::{self, Frame, Job, Observer, Phase, RenderError};
 use renderer::scene::{Diagnostic, Severity};
 
 use crate::args::RenderArguments;
+use crate::checkpoint::Checkpoints;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
 use crate::job;
@@ -33,23 +36,60 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     job::check_samples(arguments)?;
     let filtering = job::filtering(&arguments.filter)?;
     let path = job::output(arguments)?;
+    if job::is_part(&path) {
+        part::storable(&filtering).map_err(|error| Failure::Usage(error.to_string()))?;
+    }
+    if arguments.checkpoint.skip_existing && is_complete(&path) {
+        log.info(&format!("{} is there and complete: nothing to do", path.display()));
+        return Ok(());
+    }
     let output = OutputFile::prepare(&path)?;
-    let stats_path = arguments.channels.stats.as_deref().map(|path| job::named(path, arguments.frame.unwrap_or(1)));
-    let stats_file = stats_path.as_deref().map(OutputFile::prepare).transpose()?;
+    let named = |path: &Path| job::named(path, arguments.frame.unwrap_or(1));
+    let stats_file = arguments.channels.stats.as_deref().map(|path| OutputFile::prepare(&named(path))).transpose()?;
+    let checkpoint = arguments.checkpoint.checkpoint.as_deref().map(named);
+    if checkpoint.is_some() {
+        part::storable(&filtering).map_err(|error| Failure::Usage(error.to_string()))?;
+    }
+    let checkpoints = Checkpoints::new(&arguments.checkpoint, checkpoint, log)?;
 
     let job = job(arguments, filtering);
     log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
-    let reporter = Reporter { log, progress, warnings: AtomicU64::new(0), interrupt: Interrupt::default() };
+    let reporter = Reporter {
+        log,
+        progress,
+        warnings: AtomicU64::new(0),
+        interrupt: Interrupt::default(),
+        checkpoints,
+        output: &output,
+    };
     if let Err(why) = reporter.interrupt.listen() {
         log.warning(&format!("signals will end the render without an image: {why}"));
     }
-    let frame = render::render(&job, &reporter).map_err(|error| reporter.failure(error))?;
+    let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
+    let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
+    render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
+    let begun = reporter.checkpoints.begin(&prepared.description)?;
+    let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
+    let stopped = reporter.interrupt.requested() && !traced.frame.complete();
+    if stopped {
+        reporter.checkpoints.write(&mut traced.frame);
+    }
 
     progress.phase("write");
     let start = Instant::now();
     library_threads(job.threads, log);
-    let losses = exr::write(&frame.film, metadata::of_frame(&frame, arguments.channels.provenance), output.target())
-        .map_err(|error| Failure::Output(error.to_string()))?;
+    let mut losses = Losses::default();
+    let frame = if job::is_part(&path) {
+        part::write(&mut traced.frame, output.target()).map_err(|error| Failure::Output(error.to_string()))?;
+        traced.undeveloped()
+    } else {
+        pool.install(|| traced.develop())
+    };
+    if !job::is_part(&path) {
+        let attributes = metadata::of_frame(&frame, arguments.channels.provenance);
+        losses =
+            exr::write(&frame.film, attributes, output.target()).map_err(|error| Failure::Output(error.to_string()))?;
+    }
     let outcome = Outcome { path: &path, losses, write_seconds: start.elapsed().as_secs_f64() };
 
     let stats = outcome.stats(arguments, &frame, &reporter);
@@ -57,13 +97,25 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
         file.write((text + "\n").as_bytes())?;
     }
-    if reporter.interrupt.requested() && !stats.complete {
+    if stopped {
         tell(&stats, &frame, log);
-        return Err(Failure::Interrupted("interrupted; the image holds the samples up to now".into()));
+        let kept = if reporter.checkpoints.wanted() { "; the same command goes on from the checkpoint" } else { "" };
+        return Err(Failure::Interrupted(format!("interrupted; the output holds the samples up to now{kept}")));
+    }
+    if stats.complete {
+        reporter.checkpoints.clear();
     }
     progress.finish(&path, stats.memory.peak_resident_bytes);
     tell(&stats, &frame, log);
     judge(arguments, &stats)
+}
+
+/// Whether there is an image or a part that lacks no sample of those that were asked for.
+fn is_complete(path: &Path) -> bool {
+    if job::is_part(path) {
+        return Part::open(path).is_ok_and(|part| part.samples.missing(&part.description.asked).is_empty());
+    }
+    oiio::read(path).is_ok_and(|image| image.attribute("tessera/complete") == Some(&oiio::Attribute::Int(1)))
 }
 
 fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
@@ -85,6 +137,7 @@ fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
         crop: arguments.frame_area.crop,
         pixel_bounds: arguments.frame_area.pixel_bounds,
         sample_range: arguments.quality.sample_range.clone(),
+        slice: arguments.quality.slice,
         threads: job::threads(arguments.run.threads, job::slurm().as_deref()),
         aovs,
         time_limit: arguments.quality.time_limit,
@@ -106,6 +159,8 @@ struct Reporter<'a> {
     progress: &'a Progress<'a>,
     warnings: AtomicU64,
     interrupt: Interrupt,
+    checkpoints: Checkpoints<'a>,
+    output: &'a OutputFile,
 }
 
 impl Observer for Reporter<'_> {
@@ -139,12 +194,37 @@ impl Observer for Reporter<'_> {
         self.progress.advance(done);
     }
 
+    fn pass_done(&self, frame: &mut Accumulation) {
+        if self.interrupt.snapshot_requested() {
+            self.checkpoints.write(frame);
+            self.snapshot(frame);
+        } else if !self.interrupt.requested() {
+            self.checkpoints.pass_done(frame);
+        }
+    }
+
     fn stop_requested(&self) -> bool {
         self.interrupt.requested()
     }
 }
 
 impl Reporter<'_> {
+    /// Writes what there is of the output.
+    fn snapshot(&self, frame: &mut Accumulation) {
+        let path = self.output.target();
+        let written = if job::is_part(path) {
+            part::write(frame, path).map(drop).map_err(|error| error.to_string())
+        } else {
+            frame.develop();
+            let attributes = metadata::of_accumulation(frame);
+            exr::write(&frame.film, attributes, path).map(drop).map_err(|error| error.to_string())
+        };
+        match written {
+            Ok(()) => self.log.info(&format!("snapshot of samples {} in {}", frame.samples, path.display())),
+            Err(why) => self.log.warning(&format!("no snapshot: {why}; the render goes on")),
+        }
+    }
+
     /// Shows all that is wrong with a scene, and says what that means for the command.
     fn failure(&self, error: RenderError) -> Failure {
         let summary = error.to_string();
@@ -162,9 +242,10 @@ impl Reporter<'_> {
                 }
                 Failure::Input(summary)
             }
-            RenderError::EmptySampleRange(_) | RenderError::TooManySamples(_) | RenderError::Filter(_) => {
-                Failure::Usage(summary)
-            }
+            RenderError::EmptySampleRange(_)
+            | RenderError::TooManySamples(_)
+            | RenderError::Slice { .. }
+            | RenderError::Filter(_) => Failure::Usage(summary),
             RenderError::Embree(_)
             | RenderError::OpenImageIo(_)
             | RenderError::Threads { .. }

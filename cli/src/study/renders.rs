@@ -170,7 +170,7 @@ impl<'a> Studio<'a> {
         let prepared =
             pool.install(|| render::prepare(&job, &watch)).map_err(|error| job::scene_failure(&error, self.log))?;
         let (start, clock) = (Instant::now(), stats::processor_seconds());
-        let frame = pool.install(|| render::trace(prepared, None, None, &watch));
+        let frame = pool.install(|| render::trace(prepared, None, None, &watch).develop());
         let (seconds, cpu_seconds) = (start.elapsed().as_secs_f64(), stats::processor_seconds() - clock);
         if !frame.complete() {
             return Err(Failure::Interrupted(

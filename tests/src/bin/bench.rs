@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
             Some(alpha) => replay(&prepared, &AlphaTested { scene: prepared.world.geometry.scene(), alpha }, spp),
         };
         let (parse, compile) = (prepared.statistics.parse_seconds, prepared.statistics.compile_seconds);
-        let frame = render::trace(prepared, None, None, &Unobserved);
+        let frame = render::trace(prepared, None, None, &Unobserved).develop();
         let statistics = frame.statistics;
         let rays = statistics.counters.closest_hit_rays + statistics.counters.shadow_rays;
         let line = serde_json::json!({

@@ -146,7 +146,7 @@ fn seconds(scene: &SceneFile, spp: u64) -> Result<f64, Failure> {
     let traced = || -> Result<f64, Failure> {
         let prepared: Prepared = prepare(&job, &Unobserved)?;
         let start = processor_seconds()?;
-        trace(prepared, None, None, &Unobserved);
+        trace(prepared, None, None, &Unobserved).develop();
         Ok(processor_seconds()? - start)
     };
     thread_pool(1)?.install(traced)
