@@ -2,6 +2,7 @@
 
 mod compare;
 mod info;
+mod merge;
 mod preview;
 mod render;
 mod study;

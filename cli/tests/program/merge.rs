@@ -1,0 +1,138 @@
+//! `tessera merge`, and going on from checkpoints.
+
+use super::{Bench, SCENE, read};
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", SCENE);
+    bench
+}
+
+fn bytes(bench: &Bench, name: &str) -> Vec<u8> {
+    std::fs::read(bench.path(name)).unwrap()
+}
+
+/// Renders with 64 samples and some more options.
+fn render(bench: &Bench, options: &[&str]) {
+    let job = ["render", "scene.pbrt", "--spp", "64", "--aov", "all", "--progress", "none"];
+    bench.succeed(&[&job[..], options].concat());
+}
+
+#[test]
+fn any_split_gives_the_bytes_of_one_machine() {
+    let bench = bench();
+    for filter in ["none", "adaptive"] {
+        render(&bench, &["-o", "whole.exr", "--filter", filter]);
+        let whole = bytes(&bench, "whole.exr");
+        for slices in [1, 2, 3, 7] {
+            for threads in ["1", "2"] {
+                let mut names: Vec<String> = (0..slices).map(|slice| format!("{slice}.part")).collect();
+                for (slice, name) in names.iter().enumerate() {
+                    let slice = format!("{slice}/{slices}");
+                    render(&bench, &["-o", name, "--slice", &slice, "--filter", filter, "-t", threads]);
+                }
+                names.rotate_left(slices / 2);
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                bench.succeed(&[&["merge", "-o", "merged.exr"], &names[..]].concat());
+                assert!(bytes(&bench, "merged.exr") == whole, "{slices} slices, {threads} threads, filter {filter}");
+                // By way of a part of parts.
+                let (some, rest) = names.split_at(slices.div_ceil(2));
+                bench.succeed(&[&["merge", "-o", "some.part"], some].concat());
+                bench.succeed(&[&["merge", "-o", "merged.exr", "some.part"], rest].concat());
+                assert!(bytes(&bench, "merged.exr") == whole, "{slices} slices, {threads} threads, filter {filter}");
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_that_do_not_make_a_frame_are_refused_by_name() {
+    let bench = bench();
+    for (name, options) in [
+        ("a.part", &["--slice", "0/4"][..]),
+        ("b.part", &["--slice", "1/4"]),
+        ("half.part", &["--slice", "0/2"]),
+        ("last.part", &["--slice", "3/4"]),
+        ("seed.part", &["--slice", "1/4", "--seed", "9"]),
+        ("plain.part", &["--slice", "1/4", "--filter", "none"]),
+        ("within.part", &["--sample-range", "16:21"]),
+    ] {
+        render(&bench, &[&["-o", name], options].concat());
+    }
+    bench.write("not.part", "Film \"rgb\" and the rest");
+    let good = bytes(&bench, "b.part");
+    std::fs::write(bench.path("cut.part"), &good[..good.len() - 100]).unwrap();
+    let mut flipped = good.clone();
+    flipped[good.len() / 2] ^= 1;
+    std::fs::write(bench.path("flipped.part"), flipped).unwrap();
+    let mut newer = good;
+    newer[7] = 77;
+    std::fs::write(bench.path("newer.part"), newer).unwrap();
+    for (parts, words) in [
+        (&["a.part", "half.part"][..], &["a.part", "half.part", "0:16", "leave one"][..]),
+        (&["a.part", "last.part"], &["16:48", "--partial"]),
+        (&["a.part", "seed.part"], &["a.part", "seed.part", "seed", "\"9\""]),
+        (&["a.part", "plain.part"], &["plain.part", "filter", "\"none\""]),
+        (&["a.part", "within.part"], &["within.part", "21", "--resume"]),
+        (&["a.part", "not.part"], &["not.part", "not a part"]),
+        (&["a.part", "cut.part"], &["cut.part", "ends too early"]),
+        (&["a.part", "flipped.part"], &["flipped.part", "damaged"]),
+        (&["a.part", "newer.part"], &["newer.part", "version 77"]),
+        (&["a.part", "none.part"], &["none.part", "No such file"]),
+    ] {
+        let run = bench.run(&[&["merge", "-o", "out.exr", "--partial"], parts].concat());
+        let run =
+            if words.contains(&"--partial") { bench.run(&[&["merge", "-o", "out.exr"], parts].concat()) } else { run };
+        assert_eq!(run.code, 3, "{parts:?}: {}", run.stderr);
+        assert!(words.iter().all(|word| run.stderr.contains(word)), "{parts:?}: {}", run.stderr);
+    }
+    assert!(bench.files().iter().all(|name| !name.contains("part-")), "{:?}", bench.files());
+    bench.succeed(&["merge", "-o", "out.exr", "--partial", "a.part", "last.part"]);
+    let image = read(&bench.path("out.exr"));
+    assert_eq!(image.attribute("tessera/complete"), Some(&oiio::Attribute::Int(0)));
+    assert_eq!(image.attribute("tessera/sampleRange"), Some(&oiio::Attribute::Text("0:16,48:64".into())));
+    let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--spp", "16", "--slice", "4/7"]);
+    assert_eq!(run.code, 2);
+    assert!(run.stderr.contains("at most 4 slices") && run.stderr.contains("epoch"), "{}", run.stderr);
+    let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--filter", "talk"]);
+    assert_eq!(run.code, 2);
+    assert!(run.stderr.contains("talk"), "{}", run.stderr);
+}
+
+#[test]
+fn a_render_goes_on_from_its_checkpoint_to_the_same_bytes() {
+    let bench = bench();
+    for filter in ["none", "adaptive"] {
+        render(&bench, &["-o", "whole.exr", "--filter", filter]);
+        let options = ["--filter", filter, "--checkpoint", "a.checkpoint", "--checkpoint-interval", "1p"];
+        // Nothing traces so fast that a microsecond is not over after the first pass.
+        render(&bench, &[&["-o", "a.exr", "--time-limit", "0.000001s"], &options[..]].concat());
+        assert!(bench.files().contains(&"a.checkpoint".into()));
+        assert!(bytes(&bench, "a.exr") != bytes(&bench, "whole.exr"));
+        render(&bench, &[&["-o", "a.exr", "--resume", "require"], &options[..]].concat());
+        assert!(bytes(&bench, "a.exr") == bytes(&bench, "whole.exr"), "{filter}");
+        assert!(!bench.files().contains(&"a.checkpoint".into()), "what is done needs no checkpoint");
+        // What is complete is left alone, and what is not is not.
+        let before = std::fs::metadata(bench.path("a.exr")).unwrap().modified().unwrap();
+        render(&bench, &["-o", "a.exr", "--filter", filter, "--skip-existing"]);
+        assert_eq!(std::fs::metadata(bench.path("a.exr")).unwrap().modified().unwrap(), before);
+    }
+    let run = bench.run(&["render", "scene.pbrt", "-o", "a.exr", "--checkpoint", "none", "--resume", "require"]);
+    assert_eq!(run.code, 3);
+    assert!(run.stderr.contains("none"), "{}", run.stderr);
+}
+
+#[test]
+fn a_checkpoint_of_something_else_is_not_gone_on_with() {
+    let bench = bench();
+    let checkpoint = ["--checkpoint", "a.checkpoint", "--checkpoint-interval", "1p"];
+    render(&bench, &[&["-o", "a.exr", "--time-limit", "0.000001s"], &checkpoint[..]].concat());
+    let job = ["render", "scene.pbrt", "-o", "b.exr", "--spp", "16", "--aov", "all", "--checkpoint", "a.checkpoint"];
+    let run = bench.run(&[&job[..], &["--resume", "require"]].concat());
+    assert_eq!(run.code, 3);
+    assert!(run.stderr.contains("samples per pixel") && run.stderr.contains("\"16\""), "{}", run.stderr);
+    let run = bench.succeed(&job);
+    assert!(run.stderr.contains("rendering from the start"), "{}", run.stderr);
+    bench.succeed(&["render", "scene.pbrt", "-o", "c.exr", "--spp", "16", "--aov", "all"]);
+    assert!(bytes(&bench, "b.exr") == bytes(&bench, "c.exr"));
+}
