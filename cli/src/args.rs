@@ -259,6 +259,9 @@ pub struct RunArguments {
     /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
+    /// Stop at the end of the pass in which more memory than this is in use, and write what there is: 500M, 8G
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub memory_limit: Option<u64>,
     /// How progress is shown
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub progress: ProgressKind,
@@ -480,6 +483,14 @@ fn interval(text: &str) -> Result<Interval, String> {
     duration(text).map(Interval::Time)
 }
 
+fn size(text: &str) -> Result<u64, String> {
+    let wrong = || "expected a number of bytes above 0, such as 500M, 8G or 1.5T".to_owned();
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let exponent = ["", "K", "M", "G", "T"].iter().position(|known| *known == unit).ok_or_else(wrong)?;
+    let bytes = number.parse::<f64>().map_err(|_| wrong())? * 1e3f64.powi(exponent as i32);
+    (1.0..1e18).contains(&bytes).then_some(bytes as u64).ok_or_else(wrong)
+}
+
 fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "expected a time above 0, such as 90, 90s, 10m or 1.5h".to_owned();
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
@@ -564,6 +575,8 @@ mod tests {
         }
         assert_eq!(slice("1/4"), Ok(Slice { index: 1, count: 4 }));
         assert!(["4/4", "1", "-1/2", "0/0", "a/b"].iter().all(|bad| slice(bad).is_err()));
+        assert_eq!((size("500M"), size("1.5G"), size("7")), (Ok(500_000_000), Ok(1_500_000_000), Ok(7)));
+        assert!(["", "G", "0", "-1G", "1Q", "nan", "1e40"].iter().all(|bad| size(bad).is_err()));
         assert_eq!(interval("16p"), Ok(Interval::Passes(16)));
         assert_eq!(interval("1.5m"), Ok(Interval::Time(Duration::from_secs(90))));
         assert!(["0p", "p", "x", "-1p"].iter().all(|bad| interval(bad).is_err()));

@@ -1,4 +1,4 @@
-//! Parts: frames in the making as files, to be added to others or gone on with.
+//! Parts: frames in the making as files, to be added to others or gone on with. `docs/parts.md` has the format in full.
 //!
 //! | bytes | what |
 //! |---|---|
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat4, DVec3, Mat3};
 use serde::{Deserialize, Serialize};
 
-use crate::film::{AovSet, TILE, exr};
+use crate::film::{AovSet, Film, TILE, exr};
 use crate::filtering::{Filtering, Surroundings};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::Counters;
@@ -324,6 +324,11 @@ impl Part {
         if header.version != version {
             let (what, theirs, ours) = ("program version", header.version, version.to_owned());
             return Err(PartError::Mismatch { path: path.to_owned(), what, theirs, ours });
+        }
+        // Before anybody makes room for the frame: its pixels are all in the file.
+        let FrameDescription { bounds, aovs, filtering, .. } = &description;
+        if Film::stored_bytes(*bounds, *aovs, *filtering != Filtering::None) > rest {
+            return Err(PartError::Truncated(path.to_owned()));
         }
         let (counters, filter_paths) = (header.counters(), header.filter_paths);
         Ok(Self { path: path.to_owned(), description, samples, counters, filter_paths, reader, rest })

@@ -248,12 +248,20 @@ pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> 
     Ok(pool.install(|| trace(prepared, None, job.time_limit, observer).develop()))
 }
 
-/// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
-pub fn check_memory(prepared: &Prepared) -> Result<(), RenderError> {
+/// Bytes that a frame takes at least, besides its world: sums of pixels, and one path for each of them if it is filtered.
+pub fn least_memory(prepared: &Prepared) -> u64 {
     let FrameDescription { bounds, aovs, filtering, .. } = &prepared.description;
     let filtered = *filtering != Filtering::None;
     let records = if filtered { bounds.area() * size_of::<filter::PathRecord>() as u64 } else { 0 };
-    let bytes = Film::memory(*bounds, *aovs, filtered) + records;
+    Film::memory(*bounds, *aovs, filtered) + records
+}
+
+/// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
+///
+/// # Errors
+/// It would not.
+pub fn check_memory(prepared: &Prepared) -> Result<(), RenderError> {
+    let (bytes, bounds) = (least_memory(prepared), prepared.description.bounds);
     let fits = usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
     if fits { Ok(()) } else { Err(RenderError::Memory { size: [bounds.width(), bounds.height()], bytes }) }
 }

@@ -1,7 +1,7 @@
 //! `tessera render`: from a scene file to an image file.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 use renderer::film::AovSet;
@@ -60,6 +60,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         warnings: AtomicU64::new(0),
         interrupt: Interrupt::default(),
         checkpoints,
+        memory: MemoryLimit { bytes: arguments.run.memory_limit, reached: AtomicBool::new(false) },
         output: &output,
     };
     if let Err(why) = reporter.interrupt.listen() {
@@ -68,9 +69,10 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
     let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
     render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
+    reporter.memory.check(render::least_memory(&prepared))?;
     let begun = reporter.checkpoints.begin(&prepared.description)?;
     let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
-    let stopped = reporter.interrupt.requested() && !traced.frame.complete();
+    let stopped = reporter.stop_requested() && !traced.frame.complete();
     if stopped {
         reporter.checkpoints.write(&mut traced.frame);
     }
@@ -96,6 +98,10 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     if let Some(file) = stats_file {
         let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
         file.write((text + "\n").as_bytes())?;
+    }
+    if stopped && !reporter.interrupt.requested() {
+        tell(&stats, &frame, log);
+        return Err(Failure::Render("--memory-limit is reached; the output holds the samples up to now".into()));
     }
     if stopped {
         tell(&stats, &frame, log);
@@ -160,7 +166,38 @@ struct Reporter<'a> {
     warnings: AtomicU64,
     interrupt: Interrupt,
     checkpoints: Checkpoints<'a>,
+    memory: MemoryLimit,
     output: &'a OutputFile,
+}
+
+/// How much memory may be in use.
+struct MemoryLimit {
+    bytes: Option<u64>,
+    reached: AtomicBool,
+}
+
+impl MemoryLimit {
+    /// Refuses what will not fit: `more` bytes than there are now.
+    fn check(&self, more: u64) -> Result<(), Failure> {
+        let least = stats::resident_memory().unwrap_or_default() + more;
+        match self.bytes.filter(|limit| least > *limit) {
+            Some(limit) => Err(Failure::Render(format!(
+                "the frame takes {:.2} GB at least, and --memory-limit is {:.2} GB: raise it, or render parts of the frame with \
+                 --crop, with fewer auxiliary outputs, or with --filter none",
+                least as f64 / 1e9,
+                limit as f64 / 1e9
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// A pass is done.
+    fn look(&self) {
+        if let Some(limit) = self.bytes {
+            let over = stats::resident_memory().is_some_and(|bytes| bytes > limit);
+            self.reached.fetch_or(over, Ordering::Relaxed);
+        }
+    }
 }
 
 impl Observer for Reporter<'_> {
@@ -195,6 +232,7 @@ impl Observer for Reporter<'_> {
     }
 
     fn pass_done(&self, frame: &mut Accumulation) {
+        self.memory.look();
         if self.interrupt.snapshot_requested() {
             self.checkpoints.write(frame);
             self.snapshot(frame);
@@ -204,7 +242,7 @@ impl Observer for Reporter<'_> {
     }
 
     fn stop_requested(&self) -> bool {
-        self.interrupt.requested()
+        self.interrupt.requested() || self.memory.reached.load(Ordering::Relaxed)
     }
 }
 

@@ -136,3 +136,12 @@ fn a_checkpoint_of_something_else_is_not_gone_on_with() {
     bench.succeed(&["render", "scene.pbrt", "-o", "c.exr", "--spp", "16", "--aov", "all"]);
     assert!(bytes(&bench, "b.exr") == bytes(&bench, "c.exr"));
 }
+
+#[test]
+fn a_limit_of_memory_is_kept() {
+    let bench = bench();
+    let run = bench.run(&["render", "scene.pbrt", "-o", "a.exr", "--resolution", "4000x4000", "--memory-limit", "1G"]);
+    assert_eq!(run.code, 1);
+    assert!(run.stderr.contains("--memory-limit is 1.00 GB") && run.stderr.contains("--crop"), "{}", run.stderr);
+    assert!(!bench.files().contains(&"a.exr".into()));
+}

@@ -189,6 +189,13 @@ impl Film {
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
     }
 
+    /// Bytes that a film of this shape is stored as.
+    pub fn stored_bytes(bounds: Bounds, aovs: AovSet, filtered: bool) -> u64 {
+        let pixels =
+            u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
+        pixels * 8 * (Pixel::WORDS + layers(aovs, filtered).len() * Sum::<3>::WORDS) as u64
+    }
+
     /// Words that each pixel is stored as.
     pub fn words_per_pixel(&self) -> usize {
         Pixel::WORDS + self.layers.len() * Sum::<3>::WORDS
