@@ -33,7 +33,7 @@ fn triangles(count: u32) -> Vec<Emitter> {
 }
 
 fn light(kind: LightKind) -> Light {
-    Light { world_from_light: Transform::default(), kind, span: Span::default() }
+    Light { world_from_light: Transform::default(), kind, group: None, span: Span::default() }
 }
 
 /// Nanoseconds a call, the best of some rounds.
@@ -60,7 +60,14 @@ fn main() {
     scenes.extend([1, 8, 1000].map(|n| (format!("{n} points"), points(n), vec![])));
     scenes.extend([1, 2, 8, 64, 1000, 100_000].map(|n| (format!("{n} triangles"), vec![], triangles(n))));
 
-    let area = [AreaLight { radiance: Vec3::ONE, image: None, two_sided: false, power: None, span: Span::default() }];
+    let area = [AreaLight {
+        radiance: Vec3::ONE,
+        image: None,
+        two_sided: false,
+        power: None,
+        group: None,
+        span: Span::default(),
+    }];
     let inputs: Vec<(Receiver, f32, Vec2, Vec3)> = (0..4096)
         .map(|i| {
             let receiver = Receiver { p: vector(i, 20), n: vector(i, 23).normalize() };
@@ -82,7 +89,7 @@ fn main() {
         let density = nanoseconds(|i| {
             let (from, .., p) = &inputs[i];
             black_box(match count {
-                0 => lights.escaped(from.n, Some(from), 1.0).x,
+                0 => lights.escaped(from.n, Some(from), 1.0).map(|(radiance, _)| radiance.x).sum(),
                 _ => lights.emitter_pdf((i * 7919 % count) as u32, from, *p, Vec3::Z),
             });
         });

@@ -15,7 +15,7 @@ use glam::{Mat3, Vec3};
 
 pub use blend::Blend;
 pub use settings::SettingError;
-pub use tile::{Keep, Keeper, Nothing, Paths, Selection};
+pub use tile::{Keep, Keeper, Nothing, Paths, Selection, Watching};
 
 use crate::film::{Film, Layer};
 use crate::math::Rgb;

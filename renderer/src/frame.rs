@@ -3,10 +3,11 @@
 use std::fmt;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use glam::DMat4;
 
-use crate::film::{self, AovSet, Film};
+use crate::film::{self, AovSet, Film, Outputs};
 use crate::filtering::{self, Filtering, FrameFilter, Surroundings};
 use crate::integrator::Counters;
 use crate::world::Bounds;
@@ -30,6 +31,8 @@ pub struct FrameDescription {
     pub bounds: Bounds,
     /// Auxiliary outputs.
     pub aovs: AovSet,
+    /// Names of the groups of lights, by their numbers.
+    pub light_groups: Vec<Arc<str>>,
     /// How the frame is filtered.
     pub filtering: Filtering,
     /// What a filter must know of the world.
@@ -58,6 +61,12 @@ impl FrameDescription {
             ("channels", self.aovs.iter().map(film::Aov::name).collect::<Vec<_>>().join(",")),
             ("filter", self.filtering.name().to_owned() + &filter.collect::<String>()),
         ]
+    }
+
+    /// What its film shows.
+    pub fn outputs(&self) -> Outputs {
+        let groups = if self.aovs.contains(film::Aov::Light) { self.light_groups.clone() } else { Vec::new() };
+        Outputs { aovs: self.aovs, groups }
     }
 
     /// The first of [`Self::settings`] in which another frame differs: its name, and both values.
@@ -141,7 +150,7 @@ impl Accumulation {
     /// If the filter's settings are not valid, which is checked when a job is prepared.
     pub fn new(description: FrameDescription) -> Self {
         let filtered = description.filtering != Filtering::None;
-        let film = Film::new(description.resolution, description.bounds, description.aovs, filtered);
+        let film = Film::new(description.resolution, description.bounds, description.outputs(), filtered);
         let filter = FrameFilter::new(&description.filtering, &description.surroundings, &film)
             .expect("the settings of a frame's filter are valid");
         Self { description, film, filter, samples: Samples::default(), counters: Counters::default() }
@@ -172,7 +181,7 @@ impl Accumulation {
 
     /// Bytes of the sums of pixels.
     pub fn film_bytes(&self) -> u64 {
-        Film::memory(self.description.bounds, self.description.aovs, self.filter.is_some())
+        Film::memory(self.description.bounds, &self.description.outputs(), self.filter.is_some())
     }
 }
 

@@ -109,6 +109,7 @@ struct Header {
     resolution: [u32; 2],
     pixels: [[u32; 2]; 2],
     aovs: Vec<String>,
+    light_groups: Vec<String>,
     filter: String,
     settings: Vec<(String, String)>,
     origin: [f64; 3],
@@ -138,6 +139,7 @@ impl Header {
             resolution: description.resolution,
             pixels: [bounds.min, bounds.max],
             aovs: description.aovs.iter().map(|aov| aov.name().into()).collect(),
+            light_groups: description.light_groups.iter().map(|name| name.to_string()).collect(),
             filter: description.filtering.name().into(),
             settings: description.filtering.settings().into_iter().map(|(key, value)| (key.into(), value)).collect(),
             origin: surroundings.anchor.origin.to_array(),
@@ -180,6 +182,7 @@ impl Header {
             resolution: self.resolution,
             bounds: Bounds { min, max },
             aovs,
+            light_groups: self.light_groups.iter().map(|name| name.as_str().into()).collect(),
             filtering,
             surroundings: Surroundings {
                 anchor: filter::Anchor { origin: DVec3::from_array(self.origin), extent: self.extent },

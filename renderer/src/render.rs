@@ -9,8 +9,8 @@ use filter::Anchor;
 use rayon::prelude::*;
 
 use crate::compile::{self, CompileError};
-use crate::film::{self, AovSet, Film, Taken, Tile};
-use crate::filtering::{self, Filtering, Keep, Keeper, Nothing, Paths, SettingError, Surroundings};
+use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
+use crate::filtering::{self, Filtering, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
@@ -72,7 +72,8 @@ impl Slice {
         if index >= count || count > epochs {
             return Err(RenderError::Slice { slice: self, spp, epoch, epochs });
         }
-        let border = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64 * epoch;
+        let border = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64;
+        let border = |k: u64| border(k).saturating_mul(epoch);
         Ok(border(index)..border(index + 1).min(spp))
     }
 }
@@ -250,10 +251,10 @@ pub fn render(job: &Job, observer: &dyn Observer) -> Result<Frame, RenderError> 
 
 /// Bytes that a frame takes at least, besides its world: sums of pixels, and one path for each of them if it is filtered.
 pub fn least_memory(prepared: &Prepared) -> u64 {
-    let FrameDescription { bounds, aovs, filtering, .. } = &prepared.description;
+    let FrameDescription { bounds, filtering, .. } = &prepared.description;
     let filtered = *filtering != Filtering::None;
     let records = if filtered { bounds.area() * size_of::<filter::PathRecord>() as u64 } else { 0 };
-    Film::memory(*bounds, *aovs, filtered) + records
+    Film::memory(*bounds, &prepared.description.outputs(), filtered) + records
 }
 
 /// Whether the system would give what a frame takes at least. It is asked for all at once, and gets it back untouched.
@@ -309,7 +310,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         _ if job.time_limit.is_some() => asked.start..asked.start + film::MOST_TERMS,
         count => return Err(RenderError::TooManySamples(count)),
     };
-    let aovs = if description.film.gbuffer { AovSet::all() } else { job.aovs };
+    let aovs = if description.film.gbuffer { job.aovs.union(AovSet::gbuffer()) } else { job.aovs };
 
     observer.phase(Phase::Compile);
     let start = Instant::now();
@@ -335,6 +336,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         resolution: world.sensor.resolution,
         bounds: world.sensor.bounds,
         aovs,
+        light_groups: world.lights.groups().to_vec(),
         filtering,
         surroundings: Surroundings {
             anchor: Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) },
@@ -437,10 +439,10 @@ fn trace_passes<Q: Queries + Sync>(
         let pass = frame.pass(&rest);
         rest.start = pass.end;
         frame.counters += match &mut frame.filter {
-            None => passes.trace(&pass, &mut frame.film, || Nothing).0,
+            None => passes.watch(&pass, &mut frame.film, || Nothing).0,
             Some(filter) => {
                 let selection = filter.selection();
-                let (counters, paths) = passes.trace(&pass, &mut frame.film, || Paths::new(selection));
+                let (counters, paths) = passes.watch(&pass, &mut frame.film, || Paths::new(selection));
                 let start = Instant::now();
                 filter.add(&pass, &paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
                 statistics.filter_seconds += start.elapsed().as_secs_f64();
@@ -462,6 +464,21 @@ struct Passes<'a, Q> {
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
+    /// Traces samples `pass` of every pixel, looking aside if the film wants it; what was kept of them, by tile.
+    fn watch<K: Keeper>(
+        &self,
+        pass: &Range<u64>,
+        film: &mut Film,
+        keeper: impl Fn() -> K + Sync,
+    ) -> (Counters, Vec<K>) {
+        if !film.aside() {
+            return self.trace(pass, film, keeper);
+        }
+        let groups = film.outputs().groups.len();
+        let (counters, kept) = self.trace(pass, film, || Watching { keeper: keeper(), groups });
+        (counters, kept.into_iter().map(|watching| watching.keeper).collect())
+    }
+
     /// Traces samples `pass` of every pixel; what was kept of them, by tile.
     fn trace<K: Keeper>(
         &self,
@@ -553,7 +570,9 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
             let weight = offset.weight;
             let kept = Keep { slot: pixel.index, index, radiance: found, weight: weight * exposure };
             let prefix = keeper.keep(&recorder, kept) * exposure;
-            pixel.add(&Taken { index, radiance, alpha: sample.alpha, weight, prefix, first: &sample.first });
+            let film_from_scene = world.sensor.response * exposure;
+            let seen = keeper.aside(&recorder).map(|aside| Seen { aside, film_from_scene });
+            pixel.add(&Taken { index, radiance, alpha: sample.alpha, weight, prefix, first: &sample.first, seen });
         }
     });
     counters

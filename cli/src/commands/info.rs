@@ -100,7 +100,7 @@ fn build(arguments: &InfoArguments) -> Result<(Built, Vec<Diagnostic>), RenderEr
     let observer = Warnings::default();
     let prepared = render::thread_pool(threads)?.install(|| render::prepare(&job, &observer))?;
     let bounds = prepared.world.sensor.bounds;
-    let film_bytes = Film::memory(bounds, prepared.description.aovs, false);
+    let film_bytes = Film::memory(bounds, &prepared.description.outputs(), false);
     let statistics = &prepared.statistics;
     let total_bytes = stats::resident_memory().zip(stats::peak_memory());
     let built = Built {

@@ -1,6 +1,10 @@
 //! Auxiliary outputs, and what the film sums up for them.
 
+use std::sync::Arc;
+
 use super::pixel::Taken;
+use crate::integrator::Scattered;
+use crate::light::Group;
 
 /// An auxiliary output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,11 +23,23 @@ pub enum Aov {
     Variance,
     /// `sampleCount`.
     SampleCount,
+    /// `direct.{R,G,B}`: radiance that was scattered once; not filtered.
+    Direct,
+    /// `indirect.{R,G,B}`: radiance that was scattered more often.
+    Indirect,
+    /// `emission.{R,G,B}`: radiance that was not scattered: lights and the background.
+    Emission,
+    /// `light.GROUP.{R,G,B}`: radiance by group of lights; not filtered.
+    Light,
+    /// `denoise.albedo.{R,G,B}`: reflectance of the first surface that is no mirror and no smooth glass.
+    DenoiseAlbedo,
+    /// `denoise.N.{X,Y,Z}`: its shading normal, on the side that is seen, world space.
+    DenoiseNormal,
 }
 
 impl Aov {
     /// All of them, in the order of their channels.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 13] = [
         Self::Albedo,
         Self::Normal,
         Self::GeometricNormal,
@@ -31,6 +47,12 @@ impl Aov {
         Self::Depth,
         Self::Variance,
         Self::SampleCount,
+        Self::Direct,
+        Self::Indirect,
+        Self::Emission,
+        Self::Light,
+        Self::DenoiseAlbedo,
+        Self::DenoiseNormal,
     ];
 
     /// The name that users give, which is that of its layer in a file.
@@ -43,33 +65,94 @@ impl Aov {
             Self::Depth => "depth",
             Self::Variance => "variance",
             Self::SampleCount => "sampleCount",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Emission => "emission",
+            Self::Light => "light",
+            Self::DenoiseAlbedo => "denoise.albedo",
+            Self::DenoiseNormal => "denoise.N",
         }
     }
 
     /// Names of its channels in a file.
-    pub fn channels(self) -> &'static [&'static str] {
+    pub fn channels(self, groups: &[Arc<str>]) -> Vec<String> {
+        let name = self.name();
+        let of = |layer: &str, components: &str| components.chars().map(|c| format!("{layer}.{c}")).collect::<Vec<_>>();
         match self {
-            Self::Albedo => &["albedo.R", "albedo.G", "albedo.B"],
-            Self::Normal => &["N.X", "N.Y", "N.Z"],
-            Self::GeometricNormal => &["Ng.X", "Ng.Y", "Ng.Z"],
-            Self::Position => &["P.X", "P.Y", "P.Z"],
-            Self::Depth => &["depth.Z"],
-            Self::Variance => &["variance.R", "variance.G", "variance.B"],
-            Self::SampleCount => &["sampleCount"],
+            Self::Normal | Self::GeometricNormal | Self::Position | Self::DenoiseNormal => of(name, "XYZ"),
+            Self::Depth => of(name, "Z"),
+            Self::SampleCount => vec![name.into()],
+            Self::Light => groups.iter().flat_map(|group| of(&format!("{name}.{group}"), "RGB")).collect(),
+            Self::Albedo | Self::Variance | Self::Direct | Self::Indirect | Self::Emission | Self::DenoiseAlbedo => {
+                of(name, "RGB")
+            }
         }
     }
 
-    /// What is summed up for it, besides what every film sums.
-    pub fn layer(self) -> Option<Layer> {
+    /// What its channels show.
+    fn shown(self, groups: &[Arc<str>]) -> Vec<Shown> {
+        let sum = |layer| vec![Shown::Sum(layer)];
         match self {
-            Self::Albedo => Some(Layer::Albedo),
-            Self::Normal => Some(Layer::Normal),
-            Self::GeometricNormal => Some(Layer::GeometricNormal),
-            Self::Position => Some(Layer::Position),
-            Self::Depth => Some(Layer::Depth),
-            Self::Variance => Some(Layer::Squares),
-            Self::SampleCount => None,
+            Self::Albedo => sum(Layer::Albedo),
+            Self::Normal => sum(Layer::Normal),
+            Self::GeometricNormal => sum(Layer::GeometricNormal),
+            Self::Position => sum(Layer::Position),
+            Self::Depth => sum(Layer::Depth),
+            Self::Variance => sum(Layer::Squares),
+            Self::SampleCount => vec![Shown::Count],
+            Self::Direct => sum(Layer::Class(Scattered::Once)),
+            Self::Indirect => sum(Layer::Class(Scattered::Often)),
+            Self::Emission => sum(Layer::Class(Scattered::Never)),
+            Self::Light => (0..groups.len()).map(|group| Shown::Sum(Layer::Light(Group(group as u16)))).collect(),
+            Self::DenoiseAlbedo => sum(Layer::DenoiseAlbedo),
+            Self::DenoiseNormal => sum(Layer::DenoiseNormal),
         }
+    }
+}
+
+/// What some channels show of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shown {
+    /// A sum, in one or three channels.
+    Sum(Layer),
+    /// The number of samples.
+    Count,
+}
+
+/// What a film shows besides radiance and coverage.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// Auxiliary outputs.
+    pub aovs: AovSet,
+    /// Names of the groups of lights, by their numbers.
+    pub groups: Vec<Arc<str>>,
+}
+
+impl From<AovSet> for Outputs {
+    fn from(aovs: AovSet) -> Self {
+        Self { aovs, groups: Vec::new() }
+    }
+}
+
+impl Outputs {
+    /// Names of the auxiliary channels, in their order.
+    pub fn channels(&self) -> impl Iterator<Item = String> {
+        self.aovs.iter().flat_map(|aov| aov.channels(&self.groups))
+    }
+
+    /// What these channels show, in their order.
+    pub(super) fn shown(&self) -> Vec<Shown> {
+        self.aovs.iter().flat_map(|aov| aov.shown(&self.groups)).collect()
+    }
+
+    /// What is summed up for them. A `filtered` film keeps what its filter needs.
+    pub(super) fn layers(&self, filtered: bool) -> Vec<Layer> {
+        let shown = self.shown().into_iter();
+        let layers = shown.filter_map(|shown| match shown {
+            Shown::Sum(layer) => Some(layer),
+            Shown::Count => None,
+        });
+        layers.chain(filtered.then_some(Layer::Prefix)).collect()
     }
 }
 
@@ -86,6 +169,17 @@ impl AovSet {
     /// All of them.
     pub fn all() -> Self {
         Aov::ALL.into_iter().collect()
+    }
+
+    /// What pbrt's `gbuffer` asks for.
+    pub fn gbuffer() -> Self {
+        Aov::ALL.into_iter().take(7).collect()
+    }
+
+    /// Those of both sets.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 
     /// Adds the output `name`; false if there is none of that name.
@@ -128,6 +222,14 @@ pub enum Layer {
     Squares,
     /// Σ w L of the light that the frame's filter does not touch, scene RGB.
     Prefix,
+    /// Σ w L of a class of light, film RGB.
+    Class(Scattered),
+    /// Σ w L of a group of lights, film RGB.
+    Light(Group),
+    /// Σ albedo of first rough surfaces.
+    DenoiseAlbedo,
+    /// Σ their shading normals.
+    DenoiseNormal,
 }
 
 impl Layer {
@@ -135,8 +237,18 @@ impl Layer {
     pub fn first_hit(self) -> bool {
         match self {
             Self::Albedo | Self::Normal | Self::GeometricNormal | Self::Position | Self::Depth => true,
-            Self::Squares | Self::Prefix => false,
+            Self::Squares
+            | Self::Prefix
+            | Self::Class(_)
+            | Self::Light(_)
+            | Self::DenoiseAlbedo
+            | Self::DenoiseNormal => false,
         }
+    }
+
+    /// Whether paths must be watched for it.
+    pub fn aside(self) -> bool {
+        matches!(self, Self::Class(_) | Self::Light(_) | Self::DenoiseAlbedo | Self::DenoiseNormal)
     }
 
     /// What a sample adds.
@@ -153,6 +265,10 @@ impl Layer {
                 return (value * value).to_array();
             }
             Self::Prefix => taken.prefix * taken.weight,
+            Self::Class(class) => taken.seen(|seen| seen.exposed(seen.aside.class(class)) * taken.weight),
+            Self::Light(group) => taken.seen(|seen| seen.exposed(seen.aside.group(group)) * taken.weight),
+            Self::DenoiseAlbedo => taken.seen(|seen| seen.aside.feature().albedo),
+            Self::DenoiseNormal => taken.seen(|seen| seen.aside.feature().ns),
         };
         vector.as_dvec3().to_array()
     }
@@ -168,9 +284,11 @@ mod tests {
             let mut set = AovSet::default();
             assert!(set.insert(aov.name()) && set.contains(aov));
             assert_eq!(set.iter().collect::<Vec<_>>(), [aov]);
-            assert!(aov.channels().iter().all(|channel| channel.split('.').next() == Some(aov.name())));
+            let channels = aov.channels(&["key".into()]);
+            assert!(!channels.is_empty() && channels.iter().all(|channel| channel.starts_with(aov.name())));
+            assert!(aov as usize >= 7 || AovSet::gbuffer().contains(aov));
         }
         assert!(!AovSet::default().insert("Depth"));
-        assert_eq!(AovSet::all().iter().count(), Aov::ALL.len());
+        assert_eq!((AovSet::all().iter().count(), AovSet::gbuffer().iter().count()), (Aov::ALL.len(), 7));
     }
 }

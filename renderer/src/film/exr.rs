@@ -117,7 +117,7 @@ mod tests {
         film.tiles()[0].for_each(|mut pixel| {
             let radiance = Rgb::new(pixel.at[0] as f32, pixel.at[1] as f32, 0.25);
             let first = &FirstHit::NOTHING;
-            pixel.add(&Taken { index: 0, radiance, alpha: 1.0, weight: 1.0, prefix: Rgb::ZERO, first });
+            pixel.add(&Taken { index: 0, radiance, alpha: 1.0, weight: 1.0, prefix: Rgb::ZERO, first, seen: None });
         });
         let attributes = vec![("tessera/seed".to_owned(), Attribute::Text("7".into()))];
         write(&film, attributes.clone(), &path).unwrap();

@@ -1,6 +1,7 @@
 //! The image that a film shows.
 
-use super::{Aov, Film};
+use super::aov::Shown;
+use super::{Film, Layer};
 use crate::math::Rgb;
 
 /// One channel of an image.
@@ -27,39 +28,47 @@ impl Film {
     /// The image of all sums so far: `R G B A` as halves, then the auxiliary channels as floats.
     pub fn image(&self) -> Image {
         let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0 };
-        let bounds = self.bounds();
+        let (bounds, shown) = (self.bounds(), self.outputs().shown());
         image.values.reserve_exact(bounds.area() as usize * image.channels.len());
         for at in bounds.pixels() {
             image.push_radiance(self.value(at), self.pixel(at).mean_alpha());
-            self.push_auxiliary(at, &mut image.values);
+            self.push_auxiliary(at, &shown, &mut image.values);
         }
         image
     }
 
     fn channels(&self) -> Vec<Channel> {
-        let channel = |name: &&str, float| Channel { name: (*name).into(), float };
-        let radiance = ["R", "G", "B", "A"].iter().map(|name| channel(name, false));
-        radiance.chain(self.aovs().iter().flat_map(Aov::channels).map(|name| channel(name, true))).collect()
+        let radiance = ["R", "G", "B", "A"].map(|name| Channel { name: name.into(), float: false });
+        radiance.into_iter().chain(self.outputs().channels().map(|name| Channel { name, float: true })).collect()
     }
 
-    fn push_auxiliary(&self, at: [u32; 2], values: &mut Vec<f32>) {
+    fn push_auxiliary(&self, at: [u32; 2], shown: &[Shown], values: &mut Vec<f32>) {
         let pixel = self.pixel(at);
         // Albedo and normals fade to zero where nothing is seen, as denoisers expect. A position or a distance must not: it
         // is the mean over the samples that have one.
         let (all, hits) = (1.0 / pixel.count().max(1) as f64, 1.0 / pixel.hits().max(1) as f64);
-        for aov in self.aovs().iter() {
-            let sum = aov.layer().and_then(|layer| self.layer(layer, at)).unwrap_or_default();
-            match aov {
-                Aov::Albedo | Aov::Normal | Aov::GeometricNormal => values.extend((sum * all).as_vec3().to_array()),
-                Aov::Position => values.extend((sum * hits).as_vec3().to_array()),
-                Aov::Depth if pixel.hits() == 0 => values.push(f32::INFINITY),
-                Aov::Depth => values.push((sum.x * hits) as f32),
-                Aov::Variance => {
+        let light = 1.0 / pixel.normalisation();
+        for shown in shown {
+            let Shown::Sum(layer) = shown else {
+                values.push(pixel.count() as f32);
+                continue;
+            };
+            let sum = self.layer(*layer, at).unwrap_or_default();
+            match layer {
+                Layer::Depth if pixel.hits() == 0 => values.push(f32::INFINITY),
+                Layer::Depth => values.push((sum.x * hits) as f32),
+                Layer::Position => values.extend((sum * hits).as_vec3().to_array()),
+                Layer::Squares => {
                     // The square of a radiance that fits need not.
                     let variance = pixel.sample_variance(sum).min(glam::DVec3::splat(f64::from(f32::MAX)));
                     values.extend(variance.as_vec3().to_array());
                 }
-                Aov::SampleCount => values.push(pixel.count() as f32),
+                Layer::Class(_) | Layer::Light(_) | Layer::Prefix => values.extend((sum * light).as_vec3().to_array()),
+                Layer::Albedo
+                | Layer::Normal
+                | Layer::GeometricNormal
+                | Layer::DenoiseAlbedo
+                | Layer::DenoiseNormal => values.extend((sum * all).as_vec3().to_array()),
             }
         }
     }
@@ -86,7 +95,7 @@ mod tests {
         let mut film = Film::new([3, 2], Bounds::full([3, 2]), AovSet::all(), false);
         film.tiles()[0].for_each(|mut pixel| {
             let (alpha, prefix, first) = (1.0, Rgb::ZERO, &FirstHit::NOTHING);
-            let sample = |index, radiance, weight| Taken { index, radiance, alpha, weight, prefix, first };
+            let sample = |index, radiance, weight| Taken { index, radiance, alpha, weight, prefix, first, seen: None };
             pixel.add(&sample(0, Rgb::new(2.0, 1.0e9, 0.0), 1.0));
             pixel.add(&sample(1, Rgb::new(6.0, 0.0, 0.0), -0.5));
         });

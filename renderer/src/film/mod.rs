@@ -10,9 +10,9 @@ mod image;
 mod pixel;
 mod sum;
 
-pub use aov::{Aov, AovSet, Layer};
+pub use aov::{Aov, AovSet, Layer, Outputs};
 pub use image::{Channel, Image};
-pub use pixel::{Pixel, Taken};
+pub use pixel::{Pixel, Seen, Taken};
 pub use sum::{MOST_TERMS, Sum};
 
 use glam::DVec3;
@@ -29,7 +29,7 @@ pub const TILE: u32 = 16;
 pub struct Film {
     resolution: [u32; 2],
     bounds: Bounds,
-    aovs: AovSet,
+    outputs: Outputs,
     tiles: [u32; 2],
     /// Tile by tile, [`TILE`]² pixels each, so that a tile is one contiguous piece that one thread owns.
     pixels: Vec<Pixel>,
@@ -95,20 +95,21 @@ impl Tile<'_> {
 impl Film {
     /// An empty film of `resolution` of which the pixels in `bounds` are rendered. A `filtered` one keeps what a filter
     /// needs.
-    pub fn new(resolution: [u32; 2], bounds: Bounds, aovs: AovSet, filtered: bool) -> Self {
+    pub fn new(resolution: [u32; 2], bounds: Bounds, outputs: impl Into<Outputs>, filtered: bool) -> Self {
+        let outputs = outputs.into();
         let tiles = [bounds.width().div_ceil(TILE), bounds.height().div_ceil(TILE)];
         let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
-        let layers = layers(aovs, filtered);
+        let layers = outputs.layers(filtered);
         let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
-        Self { resolution, bounds, aovs, tiles, pixels, layers, sums, filtered: Vec::new() }
+        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, filtered: Vec::new() }
     }
 
     /// Bytes that a film of this shape holds.
-    pub fn memory(bounds: Bounds, aovs: AovSet, filtered: bool) -> u64 {
+    pub fn memory(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
         let result = if filtered { size_of::<Rgb>() } else { 0 };
-        pixels * (size_of::<Pixel>() + layers(aovs, filtered).len() * size_of::<Sum<3>>() + result) as u64
+        pixels * (size_of::<Pixel>() + outputs.layers(filtered).len() * size_of::<Sum<3>>() + result) as u64
     }
 
     /// Width and height of the whole frame.
@@ -121,9 +122,9 @@ impl Film {
         self.bounds
     }
 
-    /// The auxiliary outputs that are kept.
-    pub fn aovs(&self) -> AovSet {
-        self.aovs
+    /// What it shows besides radiance.
+    pub fn outputs(&self) -> &Outputs {
+        &self.outputs
     }
 
     /// Number of tiles.
@@ -163,6 +164,11 @@ impl Film {
     /// Whether samples' first hits are looked at.
     pub fn first_hit(&self) -> bool {
         self.layers.iter().any(|layer| layer.first_hit())
+    }
+
+    /// Whether paths are watched for more than their radiance and their first hits.
+    pub fn aside(&self) -> bool {
+        self.layers.iter().any(|layer| layer.aside())
     }
 
     /// Sets what the filter makes of all pixels, film RGB, row by row over the bounds.
@@ -246,11 +252,6 @@ impl Film {
     }
 }
 
-/// What films of these outputs sum up.
-fn layers(aovs: AovSet, filtered: bool) -> Vec<Layer> {
-    aovs.iter().filter_map(Aov::layer).chain(filtered.then_some(Layer::Prefix)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,7 +259,7 @@ mod tests {
 
     fn taken(index: u64, radiance: Rgb) -> Taken<'static> {
         const FIRST: FirstHit = FirstHit { depth: 2.0, ..FirstHit::NOTHING };
-        Taken { index, radiance, alpha: 1.0, weight: 1.0, prefix: 0.5 * radiance, first: &FIRST }
+        Taken { index, radiance, alpha: 1.0, weight: 1.0, prefix: 0.5 * radiance, first: &FIRST, seen: None }
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! What one pixel adds up.
 
-use glam::DVec3;
+use glam::{DVec3, Mat3, Vec3};
 
 use super::sum::Sum;
-use crate::integrator::FirstHit;
+use crate::integrator::{Aside, FirstHit};
 use crate::math::Rgb;
 
 /// A sample as the film takes it.
@@ -21,6 +21,24 @@ pub struct Taken<'a> {
     pub prefix: Rgb,
     /// What auxiliary outputs see; not looked at unless `alpha` is above 0.
     pub first: &'a FirstHit,
+    /// What else was seen, if a film wants it.
+    pub seen: Option<Seen<'a>>,
+}
+
+/// What was seen along a path.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// In scene RGB.
+    pub aside: &'a Aside,
+    /// Film RGB from scene RGB, as the sensor takes this sample.
+    pub film_from_scene: Mat3,
+}
+
+impl Seen<'_> {
+    /// Film RGB of a part of the sample's radiance.
+    pub(super) fn exposed(&self, part: Rgb) -> Rgb {
+        self.film_from_scene * part
+    }
 }
 
 impl Taken<'_> {
@@ -28,6 +46,12 @@ impl Taken<'_> {
     #[inline]
     pub(super) fn value(&self) -> DVec3 {
         (self.radiance * self.weight).as_dvec3()
+    }
+
+    /// A value of what was seen; zero where nothing was looked for, or where it is not finite.
+    #[inline]
+    pub(super) fn seen(&self, value: impl Fn(&Seen<'_>) -> Vec3) -> Vec3 {
+        self.seen.as_ref().map(value).filter(|value| value.is_finite()).unwrap_or_default()
     }
 }
 
@@ -168,7 +192,7 @@ mod tests {
 
     fn taken(index: u64, radiance: Rgb, weight: f32) -> Taken<'static> {
         const NOTHING: FirstHit = FirstHit::NOTHING;
-        Taken { index, radiance, alpha: 1.0, weight, prefix: Rgb::ZERO, first: &NOTHING }
+        Taken { index, radiance, alpha: 1.0, weight, prefix: Rgb::ZERO, first: &NOTHING, seen: None }
     }
 
     #[test]

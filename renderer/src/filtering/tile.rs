@@ -2,7 +2,7 @@
 
 use filter::PathRecord;
 
-use crate::integrator::{Cut, Recorder, Unrecorded};
+use crate::integrator::{Aside, Cut, Recorder, Unrecorded};
 use crate::math::Rgb;
 
 /// Keeps what a path's recorder has seen.
@@ -13,6 +13,35 @@ pub trait Keeper: Send {
     fn recorder(&self) -> Self::Recorder;
     /// Takes the recorder of a finished path; the light in it that the filter does not touch, scene RGB.
     fn keep(&mut self, recorder: &Self::Recorder, sample: Keep) -> Rgb;
+    /// What a recorder has seen besides, if anybody wants to know.
+    #[inline]
+    fn aside<'r>(&self, _recorder: &'r Self::Recorder) -> Option<&'r Aside> {
+        None
+    }
+}
+
+/// Keeps what another keeper does, and looks aside.
+pub struct Watching<K> {
+    /// The other one.
+    pub keeper: K,
+    /// How many groups of lights are told apart.
+    pub groups: usize,
+}
+
+impl<K: Keeper> Keeper for Watching<K> {
+    type Recorder = (K::Recorder, Aside);
+    #[inline]
+    fn recorder(&self) -> Self::Recorder {
+        (self.keeper.recorder(), Aside::new(self.groups))
+    }
+    #[inline]
+    fn keep(&mut self, recorder: &Self::Recorder, sample: Keep) -> Rgb {
+        self.keeper.keep(&recorder.0, sample)
+    }
+    #[inline]
+    fn aside<'r>(&self, recorder: &'r Self::Recorder) -> Option<&'r Aside> {
+        Some(&recorder.1)
+    }
 }
 
 /// Where a path belongs.

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{Counters, Queries};
 use crate::interaction::SurfaceInteraction;
-use crate::light::{Receiver, Target, power_heuristic};
+use crate::light::{Group, Receiver, Target, power_heuristic};
 use crate::material::Shading;
 use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
 use crate::sampling::{Use, VertexNumbers};
@@ -20,26 +20,28 @@ pub struct Scatter {
 }
 
 /// Emission of the surface at `vertex` towards where the path came from, weighted against the light sample at `last`.
-pub fn emitted(world: &World, vertex: &SurfaceInteraction<'_>, last: Option<&Scatter>) -> Rgb {
-    let Some(emitter) = world.geometry.emitter(vertex) else { return Rgb::ZERO };
+/// `None`: the surface is none that emits.
+pub fn emitted(world: &World, vertex: &SurfaceInteraction<'_>, last: Option<&Scatter>) -> Option<(Rgb, Group)> {
+    let emitter = world.geometry.emitter(vertex)?;
     let radiance = world.lights.emitted(emitter, vertex.uv(), vertex.ng, vertex.wo);
-    match (last, world.techniques) {
+    let weighted = match (last, world.techniques) {
         (Some(last), Techniques::Both) if radiance != Rgb::ZERO => {
             let light_pdf = world.lights.emitter_pdf(emitter, &last.receiver, vertex.point.p, vertex.ng);
             radiance * power_heuristic(last.pdf, light_pdf)
         }
         (Some(_), Techniques::Lights) => Rgb::ZERO,
         _ => radiance,
-    }
+    };
+    Some((weighted, world.lights.emitter_group(emitter)))
 }
 
-/// Radiance of the lights at infinity that a path which left the scene along `direction` runs into, weighted likewise.
-pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> Rgb {
-    match (last, world.techniques) {
-        (Some(last), Techniques::Both) => world.lights.escaped(direction, Some(&last.receiver), last.pdf),
-        (Some(_), Techniques::Lights) => Rgb::ZERO,
-        _ => world.lights.escaped(direction, None, 0.0),
-    }
+/// Radiance of each light at infinity that a path which left the scene along `direction` runs into, weighted likewise.
+pub fn escaped(world: &World, direction: Vec3, last: Option<&Scatter>) -> impl Iterator<Item = (Rgb, Group)> {
+    let weighted = last.filter(|_| world.techniques == Techniques::Both);
+    let found = last.is_none() || world.techniques != Techniques::Lights;
+    let lights =
+        world.lights.escaped(direction, weighted.map(|last| &last.receiver), weighted.map_or(0.0, |last| last.pdf));
+    lights.filter(move |_| found)
 }
 
 /// A vertex of a path, ready to scatter.
@@ -75,6 +77,8 @@ pub struct DirectLight {
     /// Radiance over the density of the sample, sr, weighted against the BSDF sample: times `f` this is what the vertex
     /// sends along `wo`.
     pub incident: Rgb,
+    /// The light's group.
+    pub group: Group,
 }
 
 /// Samples a light for `vertex`. `None`: no light arrives that the BSDF would send along `wo`.
@@ -107,5 +111,5 @@ pub fn sample<Q: Queries>(
         Techniques::Bsdfs if !light.delta => 0.0,
         _ => 1.0,
     };
-    Some(DirectLight { wi, f, incident: light.radiance * (weight / light.pdf) })
+    Some(DirectLight { wi, f, incident: light.radiance * (weight / light.pdf), group: light.group })
 }

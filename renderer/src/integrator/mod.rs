@@ -1,5 +1,6 @@
 //! Paths from the camera to the lights.
 
+mod aside;
 mod direct;
 mod path;
 mod queries;
@@ -7,6 +8,7 @@ mod record;
 mod recorder;
 mod roulette;
 
+pub use aside::{Aside, Feature, Scattered};
 pub use path::trace;
 pub use queries::{AlphaTested, Opaque, Queries, Recorded, Recording};
 pub use record::{FirstHit, Sample};

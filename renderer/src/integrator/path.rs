@@ -6,6 +6,7 @@ use super::direct::{self, DirectLight, Scatter, Vertex};
 use super::{Counters, FirstHit, Queries, Recorder, Sample, roulette};
 use crate::bsdf::BsdfSample;
 use crate::camera::CameraRay;
+use crate::light::Group;
 use crate::math::{Ray, Rgb, spawn_ray};
 use crate::sampling::{Dimension, Numbers, Use};
 use crate::world::World;
@@ -33,12 +34,13 @@ pub fn trace<Q: Queries, R: Recorder>(
         // Where the path goes next, and the light it runs into there.
         counters.closest_hit_rays += 1;
         let Some(hit) = queries.intersect(&path.ray) else {
-            path.meets(direct::escaped(world, path.ray.direction, path.last.as_ref()));
+            path.escape(world);
             break;
         };
         let surface = world.geometry.interaction(&path.ray, &hit);
         path.advance(surface.t);
-        path.meets(direct::emitted(world, &surface, path.last.as_ref()));
+        let emitted = direct::emitted(world, &surface, path.last.as_ref());
+        emitted.into_iter().for_each(|(radiance, group)| path.meets(radiance, group));
         if path.bounce == world.integrator.max_depth {
             break;
         }
@@ -139,9 +141,17 @@ impl<'r, R: Recorder> Path<'r, R> {
 
     /// The ray has run into light.
     #[inline]
-    fn meets(&mut self, radiance: Rgb) {
+    fn meets(&mut self, radiance: Rgb, group: Group) {
         self.radiance += self.beta * radiance;
-        self.recorder.meets(radiance);
+        self.recorder.meets(radiance, group);
+    }
+
+    /// The ray has left the scene.
+    #[inline]
+    fn escape(&mut self, world: &World) {
+        let last = self.last;
+        direct::escaped(world, self.ray.direction, last.as_ref())
+            .for_each(|(radiance, group)| self.meets(radiance, group));
     }
 
     /// The path is at a surface that scatters.

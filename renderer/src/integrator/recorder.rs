@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::direct::{DirectLight, Vertex};
 use crate::bsdf::BsdfSample;
+use crate::light::Group;
 use crate::math::Rgb;
 
 /// Is told of everything that happens to a path, in order.
@@ -18,8 +19,8 @@ pub trait Recorder {
     fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample);
     /// What follows stands for `worth` times as much.
     fn survive(&mut self, worth: f32);
-    /// The path has run into `radiance`.
-    fn meets(&mut self, radiance: Rgb);
+    /// The path has run into `radiance` of a light of `group`.
+    fn meets(&mut self, radiance: Rgb, group: Group);
 }
 
 /// Records nothing.
@@ -36,7 +37,36 @@ impl Recorder for Unrecorded {
     #[inline]
     fn survive(&mut self, _: f32) {}
     #[inline]
-    fn meets(&mut self, _: Rgb) {}
+    fn meets(&mut self, _: Rgb, _: Group) {}
+}
+
+/// Two that are told the same.
+impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+    #[inline]
+    fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32) {
+        self.0.arrive(vertex, footprint);
+        self.1.arrive(vertex, footprint);
+    }
+    #[inline]
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
+        self.0.receive(vertex, light);
+        self.1.receive(vertex, light);
+    }
+    #[inline]
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+        self.0.scatter(vertex, next);
+        self.1.scatter(vertex, next);
+    }
+    #[inline]
+    fn survive(&mut self, worth: f32) {
+        self.0.survive(worth);
+        self.1.survive(worth);
+    }
+    #[inline]
+    fn meets(&mut self, radiance: Rgb, group: Group) {
+        self.0.meets(radiance, group);
+        self.1.meets(radiance, group);
+    }
 }
 
 /// A path cut in three: up to the first vertex that is no mirror and no smooth glass, from there to the next diffuse one,
@@ -156,7 +186,7 @@ impl Recorder for Cut {
         match (self.here, &mut self.first, &mut self.second) {
             (true, _, Some(second)) => second.receive(vertex, light),
             (true, Some(first), None) => first.receive(vertex, light),
-            _ => self.meets(light.f * light.incident),
+            _ => self.meets(light.f * light.incident, light.group),
         }
     }
 
@@ -177,7 +207,7 @@ impl Recorder for Cut {
         }
     }
 
-    fn meets(&mut self, radiance: Rgb) {
+    fn meets(&mut self, radiance: Rgb, _: Group) {
         let piece = match (&self.first, &self.second) {
             (None, _) => &mut self.prefix,
             (Some(_), None) => &mut self.between,

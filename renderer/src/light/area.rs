@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 
+use super::Group;
 use super::image::LightImage;
 use crate::math::Rgb;
 use crate::shape::Shape;
@@ -15,6 +16,8 @@ pub struct AreaEmitter {
     pub shape: Shape,
     /// Its emission.
     pub emission: Emission,
+    /// Its group.
+    pub group: Group,
 }
 
 /// What each point of a surface emits, the same into all directions of a side.

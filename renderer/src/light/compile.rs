@@ -3,16 +3,16 @@
 mod candidates;
 mod sources;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 
-use super::Lights;
 use super::area::{AreaEmitter, Emission};
 use super::image::LightImage;
 use super::tree::{LightTree, build::Candidate};
+use super::{Group, Lights, NO_GROUP};
 use crate::math::{Rgb, luminance};
 use crate::scene::Span;
 use crate::scene::description::{self, AreaLightId};
@@ -61,7 +61,8 @@ impl Lights {
             images: BTreeMap::new(),
             warnings: Vec::new(),
             errors: Vec::new(),
-            built: Lights::default(),
+            group: Group::default(),
+            built: Lights { groups: groups(lights, area), ..Lights::default() },
         };
         let emissions = compiler.emissions(area);
         let mut choices = compiler.emitters(area, &emissions, emitters);
@@ -91,16 +92,33 @@ fn load(path: &Path) -> Loaded {
     Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.replaced))
 }
 
+/// The names of all groups, sorted.
+fn groups(lights: &[description::Light], area: &[description::AreaLight]) -> Vec<Arc<str>> {
+    let names = lights.iter().map(|light| &light.group).chain(area.iter().map(|light| &light.group));
+    let names: BTreeSet<&str> = names.map(|name| name.as_deref().unwrap_or(NO_GROUP)).collect();
+    names.into_iter().map(Arc::from).collect()
+}
+
 struct Compiler<Load> {
     load: Load,
     /// What each file held, `None`: it was no use, which has been said.
     images: BTreeMap<PathBuf, Option<Arc<LightImage>>>,
     warnings: Vec<Message>,
     errors: Vec<Message>,
+    /// Of the light at hand.
+    group: Group,
     built: Lights,
 }
 
 impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
+    /// The group of that name.
+    fn group_of(&self, name: &Option<Arc<str>>) -> Group {
+        let name = name.as_deref().unwrap_or(NO_GROUP);
+        Group(
+            self.built.groups.iter().position(|known| **known == *name).unwrap_or_default().min(u16::MAX.into()) as u16
+        )
+    }
+
     /// The image at `path`. `None`: there is an error about it.
     fn image(&mut self, path: &Path, span: Span) -> Option<Arc<LightImage>> {
         if let Some(known) = self.images.get(path) {
@@ -187,6 +205,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
         emitters: Vec<Emitter>,
     ) -> Vec<Candidate> {
         let means: Vec<DVec3> = self.built.images.iter().map(|image| image.mean()).collect();
+        let groups: Vec<Group> = area.iter().map(|light| self.group_of(&light.group)).collect();
         let mut degenerate = vec![0usize; area.len()];
         let mut choices = Vec::with_capacity(emitters.len());
         for Emitter { shape, light } in emitters {
@@ -207,7 +226,8 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
             } else {
                 degenerate[light.index()] += 1;
             }
-            self.built.emitters.push(AreaEmitter { shape, emission });
+            let group = groups[light.index()];
+            self.built.emitters.push(AreaEmitter { shape, emission, group });
         }
         for (light, &count) in area.iter().zip(&degenerate) {
             if count > 0 {

@@ -48,15 +48,31 @@ pub struct Lights {
     /// Over the emitters' surfaces.
     images: Vec<Arc<LightImage>>,
     /// Lights at a point.
-    points: Vec<PointLight>,
+    points: Vec<Member<PointLight>>,
     /// Over emitters, then points, numbered on.
     tree: LightTree,
     /// Those that are sampled come first.
-    infinite: Vec<Infinite>,
+    infinite: Vec<Member<Infinite>>,
     /// How many those are.
     sampled_infinite: usize,
     /// Probability of each of those; the bounded lights together have the rest.
     infinite_pmf: f32,
+    /// Names of the groups.
+    groups: Vec<Arc<str>>,
+}
+
+/// A group of lights, by its number: what its lights send is of interest by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Group(pub u16);
+
+/// The name of the group of all lights that are in none.
+pub const NO_GROUP: &str = "default";
+
+/// A light and the group that it is in.
+#[derive(Clone, Debug)]
+struct Member<L> {
+    light: L,
+    group: Group,
 }
 
 /// A point that light is gathered for.
@@ -81,6 +97,8 @@ pub struct LightSample {
     pub delta: bool,
     /// What must be visible.
     pub target: Target,
+    /// The light's group.
+    pub group: Group,
 }
 
 /// Where a light sample ends.
@@ -113,8 +131,8 @@ impl Lights {
     /// **Source**: \[Karlik19\]; pbrt-v4 does the same.
     #[must_use]
     pub fn beside_bsdf_samples(mut self) -> Self {
-        for light in &mut self.infinite {
-            light.leave_to_bsdf_samples();
+        for member in &mut self.infinite {
+            member.light.leave_to_bsdf_samples();
         }
         self.arrange();
         self
@@ -122,8 +140,8 @@ impl Lights {
 
     /// Sorts out which infinite lights are sampled, and how often.
     fn arrange(&mut self) {
-        self.infinite.sort_by_key(|light| !light.is_sampled());
-        self.sampled_infinite = self.infinite.iter().filter(|light| light.is_sampled()).count();
+        self.infinite.sort_by_key(|member| !member.light.is_sampled());
+        self.sampled_infinite = self.infinite.iter().filter(|member| member.light.is_sampled()).count();
         let choices = self.sampled_infinite + usize::from(!self.tree.is_empty());
         self.infinite_pmf = 1.0 / choices.max(1) as f32;
     }
@@ -157,7 +175,8 @@ impl Lights {
 
     #[inline]
     fn sample_infinite(&self, index: usize, from: &Receiver, u: Vec2) -> Option<LightSample> {
-        let sample = self.infinite[index].sample(from.n, u)?;
+        let Member { light, group } = &self.infinite[index];
+        let sample = light.sample(from.n, u)?;
         let pdf = sample.pdf * self.infinite_pmf;
         Some(LightSample {
             radiance: sample.radiance,
@@ -165,6 +184,7 @@ impl Lights {
             pdf,
             delta: sample.delta,
             target: Target::Infinite,
+            group: *group,
         })
     }
 
@@ -175,7 +195,7 @@ impl Lights {
         let radiance = emitter.emission.radiance(&self.images, sample.uv, sample.n, -wi);
         let pdf = sample.pdf * pmf;
         let target = Target::Surface { point: sample.point, n: sample.n };
-        usable(radiance, pdf).then_some(LightSample { radiance, wi, pdf, delta: false, target })
+        usable(radiance, pdf).then_some(LightSample { radiance, wi, pdf, delta: false, target, group: emitter.group })
     }
 
     /// Radiance that the surface point at `uv` of an emitter sends along `wo`; `n` is its unit normal as the shape orients
@@ -183,6 +203,17 @@ impl Lights {
     #[inline]
     pub fn emitted(&self, emitter: u32, uv: Vec2, n: Vec3, wo: Vec3) -> Rgb {
         self.emitters[emitter as usize].emission.radiance(&self.images, uv, n, wo)
+    }
+
+    /// The group of an emitter.
+    #[inline]
+    pub fn emitter_group(&self, emitter: u32) -> Group {
+        self.emitters[emitter as usize].group
+    }
+
+    /// Names of the groups, by their numbers: all of them have lights.
+    pub fn groups(&self) -> &[Arc<str>] {
+        &self.groups
     }
 
     /// Density (sr⁻¹) with which [`Self::sample`] would have chosen the point `p` of an emitter, which has the normal `n`
@@ -193,30 +224,33 @@ impl Lights {
         if pmf > 0.0 { pmf * self.emitters[emitter as usize].shape.pdf(from.p, p, n) } else { 0.0 }
     }
 
-    /// Radiance that a ray along the unit `direction` finds beyond the scene: for each infinite light its own, times its
+    /// Radiance that a ray along the unit `direction` finds beyond the scene: of each infinite light its own, times its
     /// weight against light samples for the receiver that the ray left with density `bsdf_pdf` (sr⁻¹). Without a receiver
     /// no light sample could have gone there: the weights are 1.
     #[inline]
-    pub fn escaped(&self, direction: Vec3, from: Option<&Receiver>, bsdf_pdf: f32) -> Rgb {
-        let mut sum = Rgb::ZERO;
-        for light in &self.infinite {
-            let (radiance, pdf) = light.radiance_and_pdf(direction, from.map_or(Vec3::ZERO, |r| r.n));
-            sum += match from {
-                Some(_) if pdf > 0.0 => radiance * power_heuristic(bsdf_pdf, pdf * self.infinite_pmf),
-                _ => radiance,
-            };
-        }
-        sum
+    pub fn escaped(
+        &self,
+        direction: Vec3,
+        from: Option<&Receiver>,
+        bsdf_pdf: f32,
+    ) -> impl Iterator<Item = (Rgb, Group)> {
+        let n = from.map_or(Vec3::ZERO, |receiver| receiver.n);
+        self.infinite.iter().map(move |Member { light, group }| {
+            let (radiance, pdf) = light.radiance_and_pdf(direction, n);
+            let weighted = from.is_some() && pdf > 0.0;
+            let weight = if weighted { power_heuristic(bsdf_pdf, pdf * self.infinite_pmf) } else { 1.0 };
+            (radiance * weight, *group)
+        })
     }
 }
 
 #[inline]
-fn sample_point(light: &PointLight, pmf: f32, from: &Receiver) -> Option<LightSample> {
+fn sample_point(Member { light, group }: &Member<PointLight>, pmf: f32, from: &Receiver) -> Option<LightSample> {
     let to_light = light.position() - from.p;
     let wi = to_light.try_normalize()?;
     let radiance = light.intensity(-wi) / to_light.length_squared();
     let target = Target::Point(light.position());
-    usable(radiance, pmf).then_some(LightSample { radiance, wi, pdf: pmf, delta: true, target })
+    usable(radiance, pmf).then_some(LightSample { radiance, wi, pdf: pmf, delta: true, target, group: *group })
 }
 
 /// The sample has a value: it is neither black nor out of the range of `f32`.

@@ -18,12 +18,17 @@ fn span(start: u32) -> Span {
     Span { file: 0, start, end: start + 1 }
 }
 
+/// Light of all groups.
+fn all(found: impl Iterator<Item = (Rgb, Group)>) -> Rgb {
+    found.map(|(radiance, _)| radiance).sum()
+}
+
 fn light(kind: LightKind) -> description::Light {
-    description::Light { world_from_light: Transform::default(), kind, span: span(0) }
+    description::Light { world_from_light: Transform::default(), kind, group: None, span: span(0) }
 }
 
 fn area_light(radiance: Rgb) -> AreaLight {
-    AreaLight { radiance, image: None, two_sided: false, power: None, span: span(1) }
+    AreaLight { radiance, image: None, two_sided: false, power: None, group: None, span: span(1) }
 }
 
 /// Images by name, as a file system would hold them.
@@ -197,7 +202,7 @@ fn density(lights: &Lights, from: &Receiver, wi: Vec3) -> f64 {
             }
         }
     }
-    let infinite = lights.infinite.iter().map(|light| f64::from(light.radiance_and_pdf(wi, from.n).1));
+    let infinite = lights.infinite.iter().map(|light| f64::from(light.light.radiance_and_pdf(wi, from.n).1));
     sum + infinite.sum::<f64>() * f64::from(lights.infinite_pmf)
 }
 
@@ -258,7 +263,7 @@ fn a_sample_has_the_density_that_a_hit_is_weighted_with() {
             Target::Infinite => {
                 beyond += 1;
                 let found = lights.infinite.iter().any(|light| {
-                    let (radiance, pdf) = light.radiance_and_pdf(sample.wi, from.n);
+                    let (radiance, pdf) = light.light.radiance_and_pdf(sample.wi, from.n);
                     radiance == sample.radiance && (pdf * lights.infinite_pmf / sample.pdf - 1.0).abs() < 1e-4
                 });
                 different += u32::from(!found);
@@ -281,7 +286,7 @@ fn light_and_bsdf_samples_weighted_together_are_complete() {
     for i in 0..SIDE * SIDE {
         let uv = (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + 0.5) / SIDE as f32;
         let wi = octahedral::direction_from_square(uv);
-        expected += lights.escaped(wi, None, 0.0).as_dvec3() * f64::from(wi.dot(n).max(0.0));
+        expected += all(lights.escaped(wi, None, 0.0)).as_dvec3() * f64::from(wi.dot(n).max(0.0));
     }
     expected *= 2.0 * TAU / (SIDE * SIDE) as f64;
     for (what, lights) in [("alone", lights.clone()), ("beside", lights.beside_bsdf_samples())] {
@@ -296,7 +301,7 @@ fn light_and_bsdf_samples_weighted_together_are_complete() {
             }
             // Irradiance by the cosine: f cosθ / pdf is π.
             let wi = Frame::from_normal(n).to_world(warp::cosine_hemisphere(random.square()));
-            let escaped = lights.escaped(wi, Some(&from), warp::cosine_hemisphere_pdf(wi.dot(n)));
+            let escaped = all(lights.escaped(wi, Some(&from), warp::cosine_hemisphere_pdf(wi.dot(n))));
             value += PI * escaped.as_dvec3();
             mean.add(value);
         }
@@ -308,12 +313,12 @@ fn light_and_bsdf_samples_weighted_together_are_complete() {
 fn specular_paths_see_environments_unweighted() {
     let lights = build(&[uniform(Rgb::ONE), environment("sky")], &[], vec![]);
     let wi = Vec3::new(0.48, 0.6, 0.64);
-    let sky = lights.infinite.iter().map(|light| light.radiance_and_pdf(wi, Vec3::ZERO).0).sum::<Rgb>();
-    assert_eq!(lights.escaped(wi, None, 0.0), sky);
+    let sky = lights.infinite.iter().map(|light| light.light.radiance_and_pdf(wi, Vec3::ZERO).0).sum::<Rgb>();
+    assert_eq!(all(lights.escaped(wi, None, 0.0)), sky);
     let from = Receiver { p: Vec3::ZERO, n: Vec3::Z };
-    assert!(lights.escaped(wi, Some(&from), 0.3).cmplt(sky).all());
+    assert!(all(lights.escaped(wi, Some(&from), 0.3)).cmplt(sky).all());
     // Nearly a delta: the light sample has no part in it.
-    assert!((lights.escaped(wi, Some(&from), 1e30) - sky).length() < 1e-5);
+    assert!((all(lights.escaped(wi, Some(&from), 1e30)) - sky).length() < 1e-5);
 }
 
 /// Luminous power of a light at a point, by a random point in each of many equal areas.
@@ -323,7 +328,7 @@ fn power(lights: &Lights) -> f64 {
     let mut sum = 0.0;
     for i in 0..SIDE * SIDE {
         let uv = (Vec2::new((i % SIDE) as f32, (i / SIDE) as f32) + random.square()) / SIDE as f32;
-        sum += f64::from(luminance(lights.points[0].intensity(octahedral::direction_from_square(uv))));
+        sum += f64::from(luminance(lights.points[0].light.intensity(octahedral::direction_from_square(uv))));
     }
     sum * 2.0 * TAU / (SIDE * SIDE) as f64
 }
@@ -402,7 +407,7 @@ fn lights_turn_with_their_transform() {
         cone_delta_angle: 5.0,
         power: None,
     };
-    let spot = description::Light { world_from_light, kind, span: span(0) };
+    let spot = description::Light { world_from_light, ..light(kind) };
     // Several, so that the tree must find them by their cones.
     let lights = build(&vec![spot; 12], &[], vec![]);
     let lit = Receiver { p: Vec3::new(5.0, 2.5, 3.2), n: Vec3::ZERO };
@@ -412,7 +417,7 @@ fn lights_turn_with_their_transform() {
         assert!(lights.sample(&Receiver { p, n: Vec3::ZERO }, 0.4, Vec2::ZERO).is_none(), "{p}");
     }
     let kind = LightKind::Distant { radiance: Rgb::ONE, from: Vec3::Z, to: Vec3::ZERO, illuminance: None };
-    let sun = build(&[description::Light { world_from_light, kind, span: span(0) }], &[], vec![]);
+    let sun = build(&[description::Light { world_from_light, ..light(kind) }], &[], vec![]);
     assert!((sun.sample(&lit, 0.4, Vec2::ZERO).unwrap().wi - Vec3::X).length() < 1e-6);
 }
 
@@ -434,7 +439,7 @@ fn narrow_spots_are_found_in_their_whole_cone() {
         let lights = build(&description, &[], vec![]);
         for _ in 0..2000 {
             let light = (random.unit() * 20.0) as usize;
-            let position = lights.points[light].position();
+            let position = lights.points[light].light.position();
             let LightKind::Spot { from, to, .. } = &description[light].kind else { unreachable!() };
             let drop = 1.0 - cone.to_radians().cos();
             let around = Frame::from_normal((*to - *from).normalize());
@@ -443,7 +448,7 @@ fn narrow_spots_are_found_in_their_whole_cone() {
                 + around.n;
             let p = position + w.normalize() * (0.1 + 5.0 * random.unit());
             let from = Receiver { p, n: Vec3::ZERO };
-            if lights.points[light].intensity((p - position).normalize()) != Rgb::ZERO {
+            if lights.points[light].light.intensity((p - position).normalize()) != Rgb::ZERO {
                 assert!(lights.tree.pmf(&from, light as u32) > 0.0, "{cone} {light}");
             }
         }
@@ -476,7 +481,7 @@ fn hopeless_input_is_safe() {
     let nowhere = Receiver { p: Vec3::ONE, n: Vec3::Z };
     let empty = build(&[], &[], vec![]);
     assert!(empty.is_empty() && empty.sample(&nowhere, 0.5, Vec2::ZERO).is_none());
-    assert_eq!(empty.escaped(Vec3::X, Some(&nowhere), 1.0), Rgb::ZERO);
+    assert_eq!(all(empty.escaped(Vec3::X, Some(&nowhere), 1.0)), Rgb::ZERO);
 
     // Lights that emit nothing are no lights.
     let dark = build(&[environment("black"), uniform(Rgb::ZERO), point(Vec3::ONE, Rgb::ZERO)], &[], vec![]);
@@ -504,7 +509,7 @@ fn bright_and_dim_lights_share_a_frame() {
         if let Some(sample) = lights.sample(&from, random.unit(), random.square()) {
             assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance.is_finite());
         }
-        let escaped = lights.escaped(random.direction(), Some(&from), random.unit() * 1e12);
+        let escaped = all(lights.escaped(random.direction(), Some(&from), random.unit() * 1e12));
         assert!(escaped.is_finite() && escaped.min_element() >= 0.0);
     }
     // Seen from the side of the dim triangle alone, it is chosen.
@@ -550,8 +555,8 @@ fn what_is_changed_is_warned_about() {
     let (built, warnings) = Lights::build_with(&lights, &[], vec![], BOUNDS, load).unwrap();
     assert_eq!(warnings.len(), 4, "{warnings:?}");
     assert!(warnings[0].1.contains("4 values"), "{warnings:?}");
-    assert_eq!(built.points[0].intensity(Vec3::X), Rgb::new(1.0, 0.0, 3.0));
-    let seen = built.escaped(Vec3::X, None, 0.0);
+    assert_eq!(built.points[0].light.intensity(Vec3::X), Rgb::new(1.0, 0.0, 3.0));
+    let seen = all(built.escaped(Vec3::X, None, 0.0));
     assert!(seen.is_finite());
 }
 
@@ -590,7 +595,7 @@ fn image_files_are_loaded_and_their_broken_values_counted() {
     for (u, v, texel) in [(0.2, 0.2, [1, 0, 3]), (0.7, 0.2, [4, 0, 6]), (0.2, 0.7, [0, 8, 9]), (0.7, 0.7, [10, 11, 12])]
     {
         let texel = Rgb::from_array(texel.map(|channel| channel as f32));
-        let seen = lights.escaped(octahedral::direction_from_square(Vec2::new(u, v)), None, 0.0);
+        let seen = all(lights.escaped(octahedral::direction_from_square(Vec2::new(u, v)), None, 0.0));
         // Texels are kept to 2⁻¹⁶ of their sum.
         assert!((seen - texel).abs().max_element() <= texel.element_sum() / 65_536.0, "{seen} {texel}");
     }

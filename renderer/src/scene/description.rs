@@ -510,6 +510,8 @@ pub struct Light {
     pub world_from_light: Transform,
     /// Kind and parameters.
     pub kind: LightKind,
+    /// The group of lights that it belongs to.
+    pub group: Option<Arc<str>>,
     /// Where it was described.
     pub span: Span,
 }
@@ -598,6 +600,8 @@ pub struct AreaLight {
     pub two_sided: bool,
     /// Total power that overrides the level.
     pub power: Option<f32>,
+    /// The group of lights that it belongs to.
+    pub group: Option<Arc<str>>,
     /// Where it was described.
     pub span: Span,
 }

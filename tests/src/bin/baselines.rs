@@ -46,7 +46,7 @@ struct Traced {
 impl Traced {
     fn new<Q: Queries>(prepared: &Prepared, queries: &Q) -> Self {
         let world = &prepared.world;
-        let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::all(), true);
+        let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::gbuffer(), true);
         let (mut paths, sampler) = (Paths::default(), Sampler::new(prepared.description.seed));
         for tile in &mut film.tiles() {
             let samples = &prepared.description.asked;

@@ -12,7 +12,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Object>, instances: Vec<Instance>) -> 
     let span = Span::default();
     let material = |kind| Material { name: None, kind, displacement: None, normal_map: None, span };
     let diffuse = || material(MaterialKind::Diffuse { reflectance: Value::Constant(Rgb::splat(0.5)) });
-    let light = AreaLight { radiance: Rgb::ONE, image: None, two_sided: false, power: None, span };
+    let light = AreaLight { radiance: Rgb::ONE, image: None, two_sided: false, power: None, group: None, span };
     Scene {
         sources: Default::default(),
         origin: glam::DVec3::ZERO,

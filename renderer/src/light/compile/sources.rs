@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
+use super::super::Member;
 use super::super::environment::{Environment, pbrt_illuminance};
 use super::super::image::LightImage;
 use super::super::infinite::Infinite;
@@ -27,6 +28,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
     /// Takes over a light and returns how it may be chosen, if it has a place in the scene.
     pub(super) fn light(&mut self, light: &Light) -> Option<Candidate> {
         let span = light.span;
+        self.group = self.group_of(&light.group);
         let light_from_world = DMat3::from_mat4(light.world_from_light.inverse().matrix());
         if !light.world_from_light.is_invertible() || light_from_world.determinant() == 0.0 {
             self.errors.push((span, "the light's transform has no inverse: check its scales".to_owned()));
@@ -112,7 +114,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
 
     /// Takes over a light at a point; its number is one beyond those of the emitters and of the lights before it.
     fn number(&mut self, light: PointLight) -> u32 {
-        self.built.points.push(light);
+        self.built.points.push(Member { light, group: self.group });
         (self.built.emitters.len() + self.built.points.len() - 1) as u32
     }
 
@@ -136,7 +138,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
     /// Takes over a light that the tree does not choose.
     fn infinite(&mut self, light: Infinite, black: bool) -> Option<Candidate> {
         if !black {
-            self.built.infinite.push(light);
+            self.built.infinite.push(Member { light, group: self.group });
         }
         None
     }

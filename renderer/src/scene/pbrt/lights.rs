@@ -2,11 +2,16 @@
 //!
 //! pbrt divides the level of every emission spectrum by its photometric luminance, so that the level of a blackbody or
 //! named spectrum is `scale` and that of an RGB its own. [`Usage::Illuminant`] does that.
+//!
+//! `"string group"` is not pbrt's: it names the group of lights whose share of the image is wanted by itself.
+
+use std::sync::Arc;
 
 use glam::Vec3;
 
 use super::context::Context;
 use super::params::Params;
+use super::report::shown;
 use super::spectra::Usage;
 use crate::math::{Rgb, Transform};
 use crate::scene::description::{AreaLight, Light, LightKind};
@@ -29,8 +34,9 @@ pub(super) fn build(cx: &mut Context, params: &mut Params, world_from_light: Tra
             None
         }
     };
+    let group = group(cx, params);
     params.finish(cx);
-    Some(Light { world_from_light, kind: kind?, span: params.span })
+    Some(Light { world_from_light, kind: kind?, group, span: params.span })
 }
 
 /// Builds the emission of a shape. `None` after an error.
@@ -49,10 +55,22 @@ pub(super) fn build_area(cx: &mut Context, params: &mut Params) -> Option<AreaLi
         image,
         two_sided: params.bool(cx, "twosided", false),
         power: power(cx, params, "power"),
+        group: group(cx, params),
         span: params.span,
     };
     params.finish(cx);
     Some(light)
+}
+
+/// The group that a light is in. Its name becomes part of those of channels, in which a dot separates layers.
+fn group(cx: &mut Context, params: &mut Params) -> Option<Arc<str>> {
+    let name = params.string(cx, "group").filter(|name| !name.is_empty())?;
+    if name.bytes().any(|byte| !byte.is_ascii_alphanumeric() && byte != b'_' && byte != b'-') {
+        let text = format!("\"group\" takes letters, digits, \"_\" and \"-\", not \"{}\"", shown(&name));
+        cx.report.error(params.span_of("group"), text);
+        return None;
+    }
+    Some(name.into())
 }
 
 /// The emission `name` times `scale`; white of luminance 1 where it is not given.
