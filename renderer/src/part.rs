@@ -329,8 +329,8 @@ impl Part {
             return Err(PartError::Mismatch { path: path.to_owned(), what, theirs, ours });
         }
         // Before anybody makes room for the frame: its pixels are all in the file.
-        let FrameDescription { bounds, aovs, filtering, .. } = &description;
-        if Film::stored_bytes(*bounds, *aovs, *filtering != Filtering::None) > rest {
+        let FrameDescription { bounds, filtering, .. } = &description;
+        if Film::stored_bytes(*bounds, &description.outputs(), *filtering != Filtering::None) > rest {
             return Err(PartError::Truncated(path.to_owned()));
         }
         let (counters, filter_paths) = (header.counters(), header.filter_paths);

@@ -72,8 +72,8 @@ impl Slice {
         if index >= count || count > epochs {
             return Err(RenderError::Slice { slice: self, spp, epoch, epochs });
         }
-        let border = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64;
-        let border = |k: u64| border(k).saturating_mul(epoch);
+        let first = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64;
+        let border = |k: u64| first(k).saturating_mul(epoch);
         Ok(border(index)..border(index + 1).min(spp))
     }
 }

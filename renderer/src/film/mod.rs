@@ -196,10 +196,10 @@ impl Film {
     }
 
     /// Bytes that a film of this shape is stored as.
-    pub fn stored_bytes(bounds: Bounds, aovs: AovSet, filtered: bool) -> u64 {
+    pub fn stored_bytes(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
-        pixels * 8 * (Pixel::WORDS + layers(aovs, filtered).len() * Sum::<3>::WORDS) as u64
+        pixels * 8 * (Pixel::WORDS + outputs.layers(filtered).len() * Sum::<3>::WORDS) as u64
     }
 
     /// Words that each pixel is stored as.
