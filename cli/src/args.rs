@@ -178,6 +178,12 @@ pub struct QualityArguments {
     /// Stop rendering after this long and write what there is: 90, 90s, 10m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time_limit: Option<Duration>,
+    /// Stop when the frame's estimated relMSE is at most this; --spp is the most that is taken
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub target_error: Option<f64>,
+    /// Stop when the mean standard error of the pixels is at most this share of the mean; --spp is the most that is taken
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub noise_threshold: Option<f64>,
     /// Exit with 5 if a sample had to be rejected because it was not a number
     #[arg(long)]
     pub strict: bool,
@@ -241,7 +247,7 @@ pub struct FrameArguments {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub struct ChannelArguments {
-    /// Auxiliary channels to write besides R G B A, or "all"
+    /// Auxiliary channels to write besides R G B A, or "all", which is all but the standard error of the pixels, "error"
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov_names())]
     pub aov: Vec<String>,
     /// Write counts, times and memory to a JSON file

@@ -3,6 +3,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use oiio::Attribute;
+use renderer::error::Estimate;
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Samples};
 use renderer::render::Frame;
@@ -11,8 +12,15 @@ use crate::{job, stats};
 
 /// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
 /// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
-pub fn of_frame(frame: &Frame, provenance: bool) -> Vec<(String, Attribute)> {
+pub fn of_frame(frame: &Frame, error: Option<&Estimate>, provenance: bool) -> Vec<(String, Attribute)> {
     let mut attributes = of_samples(&frame.description, &frame.samples);
+    if let Some(error) = error {
+        let text = |x: String| Attribute::Text(x);
+        let [low, high] = error.interval;
+        attributes.push(("tessera/relMSE".into(), text(error.relmse.to_string())));
+        attributes.push(("tessera/relMSE95".into(), text(format!("{low} {high}"))));
+        attributes.push(("tessera/relativeNoise".into(), text(error.noise.to_string())));
+    }
     if provenance {
         add_provenance(&mut attributes, frame);
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use renderer::error::Estimate;
 use renderer::filtering::Report;
 use renderer::render::Statistics;
 use serde::Serialize;
@@ -39,8 +40,40 @@ pub struct Stats<'a> {
     pub memory: Memory,
     /// The path space filter; `null` without one.
     pub filter: Option<Filter>,
+    /// What the renderer knows of the frame's error; `null` if it does not.
+    pub error: Option<Error>,
+    /// Whether `--target-error` or `--noise-threshold` ended the render.
+    pub goal_reached: bool,
     /// What was not as it should be.
     pub problems: Problems,
+}
+
+/// The frame's own estimate of its error.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Error {
+    /// Expected relMSE.
+    pub relmse: f64,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+    /// Mean standard error of the pixels over their mean.
+    pub noise: f64,
+}
+
+impl Error {
+    /// Of the renderer's.
+    pub fn of(estimate: &Estimate) -> Self {
+        Self { relmse: estimate.relmse, interval: estimate.interval, noise: estimate.noise }
+    }
+
+    /// One line for people.
+    pub fn summary(&self) -> String {
+        let [low, high] = self.interval;
+        format!(
+            "estimated relMSE {:.2e} (95 %: {low:.2e} to {high:.2e}), noise {:.2} %",
+            self.relmse,
+            100.0 * self.noise
+        )
+    }
 }
 
 /// Wall-clock seconds of the phases.

@@ -38,4 +38,5 @@ pub mod film;
 pub mod filtering;
 pub mod frame;
 pub mod part;
+pub mod error;
 pub mod render;

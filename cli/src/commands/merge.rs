@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::time::Instant;
 
+use renderer::error::{Goal, Watch};
 use renderer::film::exr;
+use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, Samples};
 use renderer::part::{self, Part, PartError};
 use renderer::render::{Statistics, Traced};
@@ -54,11 +56,14 @@ pub fn run(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
         return Ok(());
     }
     let statistics = Statistics { counters: frame.counters, ..Statistics::default() };
-    let frame = pool.install(|| Traced { frame, statistics }.develop());
+    let mut frame = pool.install(|| Traced { frame, statistics }.develop());
+    // Without a filter the sums tell the error as they do in a render of the whole.
+    let plain = frame.description.filtering == Filtering::None;
+    let error = plain.then(|| Watch::new(Goal::default()).finish(&mut frame.film)).flatten();
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }
-    exr::write(&frame.film, metadata::of_frame(&frame, arguments.provenance), file.target())
+    exr::write(&frame.film, metadata::of_frame(&frame, error.as_ref(), arguments.provenance), file.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     tell(log, output, count, &frame.samples, start);
     Ok(())

@@ -4,8 +4,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
-use renderer::film::AovSet;
+use renderer::error::{Estimate, Goal, Watch};
 use renderer::film::exr::{self, Losses};
+use renderer::film::{Aov, AovSet};
 use renderer::filtering::Filtering;
 use renderer::frame::Accumulation;
 use renderer::part::{self, Part};
@@ -54,6 +55,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
 
     let job = job(arguments, filtering);
     log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
+    let watch = watch(arguments, &job);
     let reporter = Reporter {
         log,
         progress,
@@ -62,6 +64,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         checkpoints,
         memory: MemoryLimit { bytes: arguments.run.memory_limit, reached: AtomicBool::new(false) },
         output: &output,
+        watch,
     };
     if let Err(why) = reporter.interrupt.listen() {
         log.warning(&format!("signals will end the render without an image: {why}"));
@@ -72,7 +75,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     reporter.memory.check(render::least_memory(&prepared))?;
     let begun = reporter.checkpoints.begin(&prepared.description)?;
     let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
-    let stopped = reporter.stop_requested() && !traced.frame.complete();
+    let stopped = reporter.hindered() && !traced.frame.complete();
     if stopped {
         reporter.checkpoints.write(&mut traced.frame);
     }
@@ -81,18 +84,21 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     let start = Instant::now();
     library_threads(job.threads, log);
     let mut losses = Losses::default();
+    let mut error = None;
     let frame = if job::is_part(&path) {
         part::write(&mut traced.frame, output.target()).map_err(|error| Failure::Output(error.to_string()))?;
         traced.undeveloped()
     } else {
-        pool.install(|| traced.develop())
+        let mut frame = pool.install(|| traced.develop());
+        error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
+        frame
     };
     if !job::is_part(&path) {
-        let attributes = metadata::of_frame(&frame, arguments.channels.provenance);
+        let attributes = metadata::of_frame(&frame, error.as_ref(), arguments.channels.provenance);
         losses =
             exr::write(&frame.film, attributes, output.target()).map_err(|error| Failure::Output(error.to_string()))?;
     }
-    let outcome = Outcome { path: &path, losses, write_seconds: start.elapsed().as_secs_f64() };
+    let outcome = Outcome { path: &path, losses, error, write_seconds: start.elapsed().as_secs_f64() };
 
     let stats = outcome.stats(arguments, &frame, &reporter);
     if let Some(file) = stats_file {
@@ -152,6 +158,14 @@ fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
     }
 }
 
+/// Who looks at the frame's error. It costs nothing but where there is a filter, which then is evaluated when the number of
+/// samples doubles: only if somebody asks.
+fn watch(arguments: &RenderArguments, job: &Job) -> Option<Watch> {
+    let goal = Goal { relmse: arguments.quality.target_error, noise: arguments.quality.noise_threshold };
+    let asked = job.aovs.contains(Aov::Error) || goal != Goal::default();
+    (asked || job.filtering == Filtering::None).then(|| Watch::new(goal))
+}
+
 /// OpenImageIO's own threads: the renderer allows it none beside its own; the file at the end may have all.
 fn library_threads(threads: usize, log: &Log) {
     if let Err(error) = oiio::set_threads(threads) {
@@ -168,6 +182,7 @@ struct Reporter<'a> {
     checkpoints: Checkpoints<'a>,
     memory: MemoryLimit,
     output: &'a OutputFile,
+    watch: Option<Watch>,
 }
 
 /// How much memory may be in use.
@@ -239,14 +254,22 @@ impl Observer for Reporter<'_> {
         } else if !self.interrupt.requested() {
             self.checkpoints.pass_done(frame);
         }
+        if let Some(watch) = &self.watch {
+            watch.pass_done(frame);
+        }
     }
 
     fn stop_requested(&self) -> bool {
-        self.interrupt.requested() || self.memory.reached.load(Ordering::Relaxed)
+        self.hindered() || self.watch.as_ref().is_some_and(Watch::reached)
     }
 }
 
 impl Reporter<'_> {
+    /// Whether something other than success ends the render.
+    fn hindered(&self) -> bool {
+        self.interrupt.requested() || self.memory.reached.load(Ordering::Relaxed)
+    }
+
     /// Writes what there is of the output.
     fn snapshot(&self, frame: &mut Accumulation) {
         let path = self.output.target();
@@ -296,6 +319,7 @@ impl Reporter<'_> {
 struct Outcome<'a> {
     path: &'a Path,
     losses: Losses,
+    error: Option<Estimate>,
     write_seconds: f64,
 }
 
@@ -337,6 +361,8 @@ impl<'a> Outcome<'a> {
                 film_bytes: statistics.film_bytes,
             },
             filter: Filter::of(statistics),
+            error: self.error.as_ref().map(stats::Error::of),
+            goal_reached: reporter.watch.as_ref().is_some_and(Watch::reached),
             problems: Problems {
                 warnings: reporter.warnings.load(Ordering::Relaxed),
                 rejected_samples: counters.rejected_samples,
@@ -351,7 +377,12 @@ impl<'a> Outcome<'a> {
 fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
     let [start, end] = stats.samples;
     let asked = &frame.description.asked;
-    if !stats.complete {
+    if let Some(error) = &stats.error {
+        log.info(&error.summary());
+    }
+    if stats.goal_reached {
+        log.info(&format!("good enough with {} of {} samples per pixel", end - start, asked.end - asked.start));
+    } else if !stats.complete {
         log.warning(&format!(
             "stopped early: {} of {} samples per pixel were taken",
             end - start,

@@ -266,3 +266,29 @@ fn names_in_a_scene_cannot_forge_progress() {
         assert!(!run.stderr.contains(word), "{}", run.stderr);
     }
 }
+
+#[test]
+fn a_render_knows_its_error_and_stops_at_a_target() {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", SCENE);
+    let stats = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(bench.path(name)).unwrap()).unwrap()
+    };
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--spp", "8", "--filter", "none", "--stats", "a.json"]);
+    for (filter, target) in [("none", "0.01"), ("adaptive", "0.02")] {
+        let args =
+            ["--filter", filter, "--target-error", target, "--spp", "4096", "--aov", "error", "--stats", "b.json"];
+        let run = bench.succeed(&[&["render", "scene.pbrt", "-o", "b.exr"], &args[..]].concat());
+        let found = stats("b.json");
+        let estimate = found["error"]["relmse"].as_f64().unwrap();
+        assert!(found["goal_reached"] == true && found["samples"][1].as_u64().unwrap() < 4096, "{found}");
+        assert!(estimate > 0.0 && estimate <= target.parse().unwrap(), "{found}");
+        assert!(run.stderr.contains("estimated relMSE") && run.stderr.contains("good enough"), "{}", run.stderr);
+        let image = read(&bench.path("b.exr"));
+        let error = image.channel("error.G").unwrap();
+        let known = image.pixels.chunks_exact(image.channels.len()).filter(|pixel| pixel[error] > 0.0).count();
+        assert!(known > image.width * image.height / 2, "{known}");
+    }
+    // Without a filter the estimate costs nothing and is always there.
+    assert!(stats("a.json")["error"]["interval"][1].as_f64().unwrap() > 0.0);
+}

@@ -35,11 +35,13 @@ pub enum Aov {
     DenoiseAlbedo,
     /// `denoise.N.{X,Y,Z}`: its shading normal, on the side that is seen, world space.
     DenoiseNormal,
+    /// `error.{R,G,B}`: standard error of the pixel, film RGB.
+    Error,
 }
 
 impl Aov {
     /// All of them, in the order of their channels.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Albedo,
         Self::Normal,
         Self::GeometricNormal,
@@ -53,6 +55,7 @@ impl Aov {
         Self::Light,
         Self::DenoiseAlbedo,
         Self::DenoiseNormal,
+        Self::Error,
     ];
 
     /// The name that users give, which is that of its layer in a file.
@@ -71,6 +74,7 @@ impl Aov {
             Self::Light => "light",
             Self::DenoiseAlbedo => "denoise.albedo",
             Self::DenoiseNormal => "denoise.N",
+            Self::Error => "error",
         }
     }
 
@@ -83,9 +87,13 @@ impl Aov {
             Self::Depth => of(name, "Z"),
             Self::SampleCount => vec![name.into()],
             Self::Light => groups.iter().flat_map(|group| of(&format!("{name}.{group}"), "RGB")).collect(),
-            Self::Albedo | Self::Variance | Self::Direct | Self::Indirect | Self::Emission | Self::DenoiseAlbedo => {
-                of(name, "RGB")
-            }
+            Self::Albedo
+            | Self::Variance
+            | Self::Direct
+            | Self::Indirect
+            | Self::Emission
+            | Self::DenoiseAlbedo
+            | Self::Error => of(name, "RGB"),
         }
     }
 
@@ -106,6 +114,7 @@ impl Aov {
             Self::Light => (0..groups.len()).map(|group| Shown::Sum(Layer::Light(Group(group as u16)))).collect(),
             Self::DenoiseAlbedo => sum(Layer::DenoiseAlbedo),
             Self::DenoiseNormal => sum(Layer::DenoiseNormal),
+            Self::Error => vec![Shown::Error],
         }
     }
 }
@@ -117,6 +126,8 @@ pub(super) enum Shown {
     Sum(Layer),
     /// The number of samples.
     Count,
+    /// The standard error.
+    Error,
 }
 
 /// What a film shows besides radiance and coverage.
@@ -150,7 +161,7 @@ impl Outputs {
         let shown = self.shown().into_iter();
         let layers = shown.filter_map(|shown| match shown {
             Shown::Sum(layer) => Some(layer),
-            Shown::Count => None,
+            Shown::Count | Shown::Error => None,
         });
         layers.chain(filtered.then_some(Layer::Prefix)).collect()
     }
@@ -166,9 +177,9 @@ impl AovSet {
         Aov::ALL.into_iter().map(Aov::name)
     }
 
-    /// All of them.
+    /// All that a frame's sums give: not [`Aov::Error`], for which a filtered frame must be watched while it is rendered.
     pub fn all() -> Self {
-        Aov::ALL.into_iter().collect()
+        Aov::ALL.into_iter().filter(|aov| *aov != Aov::Error).collect()
     }
 
     /// What pbrt's `gbuffer` asks for.
@@ -289,6 +300,6 @@ mod tests {
             assert!(aov as usize >= 7 || AovSet::gbuffer().contains(aov));
         }
         assert!(!AovSet::default().insert("Depth"));
-        assert_eq!((AovSet::all().iter().count(), AovSet::gbuffer().iter().count()), (Aov::ALL.len(), 7));
+        assert_eq!((AovSet::all().iter().count(), AovSet::gbuffer().iter().count()), (Aov::ALL.len() - 1, 7));
     }
 }

@@ -1,7 +1,7 @@
 //! The image that a film shows.
 
 use super::aov::Shown;
-use super::{Film, Layer};
+use super::{Aov, Film, Layer, Outputs};
 use crate::math::Rgb;
 
 /// One channel of an image.
@@ -27,8 +27,9 @@ pub struct Image {
 impl Film {
     /// The image of all sums so far: `R G B A` as halves, then the auxiliary channels as floats.
     pub fn image(&self) -> Image {
-        let mut image = Image { channels: self.channels(), values: Vec::new(), clamped_negative: 0 };
-        let (bounds, shown) = (self.bounds(), self.outputs().shown());
+        let outputs = self.known_outputs();
+        let mut image = Image { channels: channels(&outputs), values: Vec::new(), clamped_negative: 0 };
+        let (bounds, shown) = (self.bounds(), outputs.shown());
         image.values.reserve_exact(bounds.area() as usize * image.channels.len());
         for at in bounds.pixels() {
             image.push_radiance(self.value(at), self.pixel(at).mean_alpha());
@@ -37,9 +38,11 @@ impl Film {
         image
     }
 
-    fn channels(&self) -> Vec<Channel> {
-        let radiance = ["R", "G", "B", "A"].map(|name| Channel { name: name.into(), float: false });
-        radiance.into_iter().chain(self.outputs().channels().map(|name| Channel { name, float: true })).collect()
+    /// The outputs that there are values for.
+    fn known_outputs(&self) -> Outputs {
+        let Outputs { aovs, groups } = self.outputs().clone();
+        let known = |aov: &Aov| *aov != Aov::Error || !self.errors.is_empty();
+        Outputs { aovs: aovs.iter().filter(known).collect(), groups }
     }
 
     fn push_auxiliary(&self, at: [u32; 2], shown: &[Shown], values: &mut Vec<f32>) {
@@ -49,9 +52,16 @@ impl Film {
         let (all, hits) = (1.0 / pixel.count().max(1) as f64, 1.0 / pixel.hits().max(1) as f64);
         let light = 1.0 / pixel.normalisation();
         for shown in shown {
-            let Shown::Sum(layer) = shown else {
-                values.push(pixel.count() as f32);
-                continue;
+            let layer = match shown {
+                Shown::Sum(layer) => layer,
+                Shown::Count => {
+                    values.push(pixel.count() as f32);
+                    continue;
+                }
+                Shown::Error => {
+                    values.extend(self.error(at).to_array());
+                    continue;
+                }
             };
             let sum = self.layer(*layer, at).unwrap_or_default();
             match layer {
@@ -72,6 +82,11 @@ impl Film {
             }
         }
     }
+}
+
+fn channels(outputs: &Outputs) -> Vec<Channel> {
+    let radiance = ["R", "G", "B", "A"].map(|name| Channel { name: name.into(), float: false });
+    radiance.into_iter().chain(outputs.channels().map(|name| Channel { name, float: true })).collect()
 }
 
 impl Image {

@@ -39,6 +39,8 @@ pub struct Film {
     sums: Vec<Sum<3>>,
     /// In the same order: what the filter makes of the pixels, film RGB. Empty until then.
     filtered: Vec<Rgb>,
+    /// In the same order: standard errors of the pixels. Empty until they are known.
+    errors: Vec<Rgb>,
 }
 
 /// One tile of a film, exclusively held by a thread.
@@ -101,7 +103,7 @@ impl Film {
         let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
         let layers = outputs.layers(filtered);
         let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
-        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, filtered: Vec::new() }
+        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, filtered: Vec::new(), errors: Vec::new() }
     }
 
     /// Bytes that a film of this shape holds.
@@ -183,6 +185,25 @@ impl Film {
     /// Value of the pixel at `[x, y]`, film RGB: filtered if the frame is.
     pub fn value(&self, at: [u32; 2]) -> glam::DVec3 {
         self.filtered.get(self.index(at)).map_or_else(|| self.pixel(at).mean(), |value| value.as_dvec3())
+    }
+
+    /// Whether the film has filtered values.
+    pub fn filtered(&self) -> bool {
+        !self.filtered.is_empty()
+    }
+
+    /// Sets the standard errors of all pixels, film RGB, row by row over the bounds.
+    pub fn set_errors(&mut self, errors: &[Rgb]) {
+        self.errors = vec![Rgb::ZERO; self.pixels.len()];
+        for (error, at) in errors.iter().zip(self.bounds.pixels()) {
+            let index = self.index(at);
+            self.errors[index] = *error;
+        }
+    }
+
+    /// Standard error of the pixel at `[x, y]`, film RGB; 0 while it is not known.
+    pub fn error(&self, at: [u32; 2]) -> Rgb {
+        self.errors.get(self.index(at)).copied().unwrap_or(Rgb::ZERO)
     }
 
     /// Adds the samples of another film.
