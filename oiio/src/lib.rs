@@ -8,7 +8,7 @@
 //! No C++ exception and no Rust panic crosses the border; only plain data does. Nothing is linearised: values are those
 //! of the file. The same picture gives the same file, byte for byte, whatever the time and the threads.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
 mod error;
 mod ffi;
@@ -26,21 +26,28 @@ pub use write::{Channel, Compression, FileFormat, Output, Written, write};
 /// Threads that OpenImageIO and OpenEXR use inside one call, from now on and in the whole process.
 ///
 /// 1 means the calling thread alone: right while a renderer's own threads are at work. Setting what is set already does
-/// nothing, so that callers need not agree on who is the first.
+/// nothing, so that callers need not agree on who is the first. Waits for reads and writes of files that are under way.
 ///
 /// # Errors
 /// OpenImageIO refuses the number.
 pub fn set_threads(threads: usize) -> Result<(), Error> {
-    // OpenImageIO aborts the process when two threads resize its pool at once.
-    static CURRENT: Mutex<Option<i32>> = Mutex::new(None);
     let threads = i32::try_from(threads.max(1)).map_err(|_| Error::Library(format!("{threads} threads")))?;
-    let mut current = CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut current = POOL.write().unwrap_or_else(PoisonError::into_inner);
     if *current != Some(threads) {
         // SAFETY: `error` is valid for the write.
         ffi::check(|error| unsafe { ffi::shim_set_threads(threads, error) }).map_err(Error::Library)?;
         *current = Some(threads);
     }
     Ok(())
+}
+
+/// The size that the pool was given. OpenImageIO aborts the process when a thread resizes its pool while another resizes or
+/// uses it, so whoever does what may use it holds this.
+static POOL: RwLock<Option<i32>> = RwLock::new(None);
+
+/// Keeps the pool as it is.
+fn steady_pool() -> RwLockReadGuard<'static, Option<i32>> {
+    POOL.read().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Version of the OpenImageIO that the shim was compiled against.

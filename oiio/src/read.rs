@@ -45,6 +45,7 @@ impl Reader {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let fail = |reason| Error::Open { path: path.to_owned(), reason };
+        let _pool = crate::steady_pool();
         let c_path = ffi::c_path(path).map_err(fail)?;
         let mut raw = std::ptr::null_mut();
         let mut info = ShimInfo::default();
@@ -138,6 +139,7 @@ impl Reader {
             return Err(fail(reason));
         };
         pixels.resize(count, T::default());
+        let _pool = crate::steady_pool();
         // SAFETY: the buffer holds width · height · channels items of the format asked for, which is what
         // `read_image` writes with its default strides.
         ffi::check(|error| unsafe {

@@ -82,6 +82,7 @@ const NO_DATE: &str = "1970:01:01 00:00:00";
 /// The numbers of channels, pixels and values disagree, or the file cannot be written.
 pub fn write(output: &Output) -> Result<Written, Error> {
     let fail = |reason| Error::Write { path: output.path.to_owned(), reason };
+    let _pool = crate::steady_pool();
     check_shape(output).map_err(fail)?;
     let path = ffi::c_path(output.path).map_err(fail)?;
     let (pixels, written) = within_half_range(output);
