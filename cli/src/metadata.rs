@@ -4,6 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use oiio::Attribute;
 use renderer::error::Estimate;
+use renderer::film::{Aov, cryptomatte};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Samples};
 use renderer::render::Frame;
@@ -51,6 +52,12 @@ fn of_samples(description: &FrameDescription, samples: &Samples) -> Vec<(String,
         ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
         ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(description)))),
     ];
+    for (aov, names) in [Aov::CryptoObject, Aov::CryptoMaterial].into_iter().zip(&description.names) {
+        if description.aovs.contains(aov) {
+            let entries = cryptomatte::metadata(aov.name(), names).into_iter();
+            attributes.extend(entries.map(|(key, value)| (key, text(value))));
+        }
+    }
     if let Some(ndc_from_world) = description.ndc_from_world {
         let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
         attributes.push(("worldtoNDC".into(), matrix));

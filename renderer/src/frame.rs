@@ -33,6 +33,8 @@ pub struct FrameDescription {
     pub aovs: AovSet,
     /// Names of the groups of lights, by their numbers.
     pub light_groups: Vec<Arc<str>>,
+    /// Names that mattes may show, of objects and of materials; sorted, and empty where there are no such mattes.
+    pub names: [Vec<Arc<str>>; 2],
     /// How the frame is filtered.
     pub filtering: Filtering,
     /// What a filter must know of the world.

@@ -15,6 +15,7 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DMat4, DVec3, Mat3};
 use serde::{Deserialize, Serialize};
@@ -110,6 +111,7 @@ struct Header {
     pixels: [[u32; 2]; 2],
     aovs: Vec<String>,
     light_groups: Vec<String>,
+    names: [Vec<String>; 2],
     filter: String,
     settings: Vec<(String, String)>,
     origin: [f64; 3],
@@ -139,7 +141,8 @@ impl Header {
             resolution: description.resolution,
             pixels: [bounds.min, bounds.max],
             aovs: description.aovs.iter().map(|aov| aov.name().into()).collect(),
-            light_groups: description.light_groups.iter().map(|name| name.to_string()).collect(),
+            light_groups: texts(&description.light_groups),
+            names: [0, 1].map(|named| texts(&description.names[named])),
             filter: description.filtering.name().into(),
             settings: description.filtering.settings().into_iter().map(|(key, value)| (key.into(), value)).collect(),
             origin: surroundings.anchor.origin.to_array(),
@@ -182,7 +185,8 @@ impl Header {
             resolution: self.resolution,
             bounds: Bounds { min, max },
             aovs,
-            light_groups: self.light_groups.iter().map(|name| name.as_str().into()).collect(),
+            light_groups: shared(&self.light_groups),
+            names: [0, 1].map(|named| shared(&self.names[named])),
             filtering,
             surroundings: Surroundings {
                 anchor: filter::Anchor { origin: DVec3::from_array(self.origin), extent: self.extent },
@@ -269,6 +273,14 @@ fn write_sections(frame: &mut Accumulation, writer: &mut impl Write) -> io::Resu
         filter.store_epoch(next, &mut words);
     }
     Ok(bytes + put(&mut words, writer)?)
+}
+
+fn texts(names: &[Arc<str>]) -> Vec<String> {
+    names.iter().map(|name| name.to_string()).collect()
+}
+
+fn shared(names: &[String]) -> Vec<Arc<str>> {
+    names.iter().map(|name| name.as_str().into()).collect()
 }
 
 /// The pixels of a tile, by their indices.
@@ -379,11 +391,10 @@ impl Part {
             let word = |chunk: &[u8]| chunk.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte));
             Ok(bytes.chunks_exact(8).map(word).collect::<Vec<u64>>())
         };
-        let film_words = frame.film.words_per_pixel() * (TILE * TILE) as usize;
         for tile in 0..frame.film.tile_count() {
             let words = read()?;
-            let (pixels, cells) = words.split_at_checked(film_words).ok_or_else(damaged)?;
-            frame.film.load(tile_pixels(tile).start, pixels).ok_or_else(damaged)?;
+            let mut cells = words.as_slice();
+            frame.film.load(tile_pixels(tile), &mut cells).ok_or_else(damaged)?;
             match &mut frame.filter {
                 Some(filter) => filter.load(tile, tile_pixels(tile), cells).map_err(|_| damaged())?,
                 None if cells.is_empty() => {}

@@ -1,14 +1,18 @@
 //! From scene file to film. Read this first: every other module is one line of it.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use filter::Anchor;
 use rayon::prelude::*;
 
+use crate::compile::names::Names;
 use crate::compile::{self, CompileError};
+use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
 use crate::filtering::{self, Filtering, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Samples};
@@ -236,6 +240,8 @@ pub struct Prepared {
     pub statistics: Statistics,
     /// Owns the BVH's memory.
     pub device: embree::Device,
+    /// Ids of the names of objects and materials, by surface; empty where no matte shows them.
+    ids: Vec<[u32; 2]>,
 }
 
 /// Renders one job.
@@ -325,6 +331,12 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     statistics.embree_bytes = device.memory().peak;
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
+    let mattes = [film::Aov::CryptoObject, film::Aov::CryptoMaterial].map(|aov| aovs.contains(aov));
+    let names = mattes.contains(&true).then(|| Names::new(&description, &world.geometry)).unwrap_or_default();
+    let ids = names.objects.iter().zip(&names.materials).map(|(object, material)| [id(object), id(material)]).collect();
+    let manifest = |(shown, names): (bool, &[Arc<str>])| if shown { sorted(names) } else { Vec::new() };
+    let named = [(mattes[0], &names.objects[..]), (mattes[1], &names.materials[..])];
+
     let ours_from_world = glam::DMat4::from_translation(-world.origin);
     let (low, high) = world.geometry.bounds();
     let mut description = FrameDescription {
@@ -337,6 +349,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         bounds: world.sensor.bounds,
         aovs,
         light_groups: world.lights.groups().to_vec(),
+        names: [manifest(named[0]), manifest(named[1])],
         filtering,
         surroundings: Surroundings {
             anchor: Anchor { origin: world.camera.position().as_dvec3(), extent: f64::from(low.distance(high)) },
@@ -353,7 +366,12 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
             Some(alpha) => unit(&world, &AlphaTested { scene: world.geometry.scene(), alpha }, seed),
         };
     }
-    Ok(Prepared { world, description, statistics, device })
+    Ok(Prepared { world, description, statistics, device, ids })
+}
+
+/// Each name once.
+fn sorted(names: &[Arc<str>]) -> Vec<Arc<str>> {
+    names.iter().cloned().collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// The seed of one frame of a sequence.
@@ -382,13 +400,15 @@ pub fn trace(
     assert_eq!(frame.description.difference(&prepared.description), None, "another frame was begun");
     frame.description = prepared.description;
     let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
-    let Prepared { world, mut statistics, .. } = prepared;
+    let Prepared { world, mut statistics, ids, .. } = prepared;
     statistics.film_bytes = frame.film_bytes();
     match world.geometry.alpha_test(&world.textures) {
-        None => trace_passes(&world, &Opaque(world.geometry.scene()), &mut frame, &mut statistics, observer, &over),
+        None => {
+            trace_passes(&world, &Opaque(world.geometry.scene()), &ids, &mut frame, &mut statistics, observer, &over)
+        }
         Some(alpha) => {
             let queries = AlphaTested { scene: world.geometry.scene(), alpha };
-            trace_passes(&world, &queries, &mut frame, &mut statistics, observer, &over);
+            trace_passes(&world, &queries, &ids, &mut frame, &mut statistics, observer, &over);
         }
     }
     statistics.counters = frame.counters;
@@ -427,6 +447,7 @@ impl Traced {
 fn trace_passes<Q: Queries + Sync>(
     world: &World,
     queries: &Q,
+    ids: &[[u32; 2]],
     frame: &mut Accumulation,
     statistics: &mut Statistics,
     observer: &dyn Observer,
@@ -434,7 +455,7 @@ fn trace_passes<Q: Queries + Sync>(
 ) {
     let mut rest = frame.samples.missing(&frame.description.asked);
     let progress = Progress::new(&frame.film, &frame.description.asked, rest.start, observer);
-    let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), progress };
+    let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), ids, progress };
     while !rest.is_empty() && (frame.samples.count() == 0 || !over()) {
         let pass = frame.pass(&rest);
         rest.start = pass.end;
@@ -460,6 +481,8 @@ struct Passes<'a, Q> {
     world: &'a World,
     queries: &'a Q,
     sampler: Sampler,
+    /// See [`Prepared::ids`].
+    ids: &'a [[u32; 2]],
     progress: Progress<'a>,
 }
 
@@ -475,7 +498,7 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
             return self.trace(pass, film, keeper);
         }
         let groups = film.outputs().groups.len();
-        let (counters, kept) = self.trace(pass, film, || Watching { keeper: keeper(), groups });
+        let (counters, kept) = self.trace(pass, film, || Watching { keeper: keeper(), groups, ids: self.ids });
         (counters, kept.into_iter().map(|watching| watching.keeper).collect())
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use renderer::film::{AovSet, Film, Image};
+use renderer::film::{AovSet, Film, Image, cryptomatte};
 use renderer::render::{Job, Unobserved, render};
 use tests::render::{own_scene, run};
 
@@ -101,6 +101,57 @@ fn denoisers_see_through_mirrors_and_glass() {
     // Where the first hit is rough, both are the same.
     let floor = 30 * 48 + 24;
     assert_eq!(layer(&image, "albedo")[floor], layer(&image, "denoise.albedo")[floor]);
+}
+
+/// Ids and coverages of a pixel's ranks.
+fn ranks(image: &Image, layer: &str, pixel: usize) -> Vec<(u32, f32)> {
+    let first = image.channels.iter().position(|c| c.name == format!("{layer}00.R")).expect("a first layer");
+    let values = &image.values[pixel * image.channels.len() + first..][..12];
+    values.chunks_exact(2).map(|rank| (rank[0].to_bits(), rank[1])).collect()
+}
+
+#[test]
+fn mattes_cover_what_is_seen_and_know_it_by_name() {
+    let scene = own_scene("aov/names.pbrt");
+    let layers = ["CryptoObject", "CryptoMaterial"];
+    let frame = run(&Job { spp: Some(64), ..job(&scene, &layers) });
+    let image = frame.film.image();
+    let known = [vec!["ball", "names.pbrt:28", "tree"], vec!["names.pbrt:27", "red", "white"]];
+    for ((layer, names), known) in layers.iter().zip(&frame.description.names).zip(known) {
+        assert_eq!(names.iter().map(|name| &**name).collect::<Vec<_>>(), known);
+        let mut seen = std::collections::BTreeSet::new();
+        for (index, pixel) in image.values.chunks_exact(image.channels.len()).enumerate() {
+            let ranks = ranks(&image, layer, index);
+            let covered: f32 = ranks.iter().map(|(_, share)| share).sum();
+            assert!((covered - pixel[3]).abs() < 1e-6, "pixel {index}: {covered} of {}", pixel[3]);
+            assert!(ranks.windows(2).all(|pair| pair[0].1 >= pair[1].1), "{ranks:?}");
+            seen.extend(ranks.iter().map(|(id, _)| *id).filter(|id| *id != 0));
+        }
+        assert_eq!(seen, names.iter().map(|name| cryptomatte::id(name)).collect(), "{layer}");
+    }
+    // The middle of the ball is all ball, and red.
+    let middle = 16 * 48 + 24;
+    assert_eq!(ranks(&image, "CryptoObject", middle)[0], (cryptomatte::id("ball"), 1.0));
+    assert_eq!(ranks(&image, "CryptoMaterial", middle)[0], (cryptomatte::id("red"), 1.0));
+}
+
+#[test]
+fn slices_have_the_outputs_of_the_whole_bit_for_bit() {
+    let all = |range: Option<std::ops::Range<u64>>| {
+        let job = job(&own_scene("aov/names.pbrt"), &[]);
+        run(&Job { aovs: AovSet::all(), sample_range: range, ..job }).film
+    };
+    let bits = |film: &Film| film.image().values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    let whole = bits(&all(None));
+    for parts in [[0..3, 3..4, 4..8], [4..8, 0..3, 3..4]] {
+        let [mut sum, second, third] = parts.map(|range| all(Some(range)));
+        sum.merge(&second);
+        let mut words = Vec::new();
+        third.store(0..third.slots(), &mut words);
+        let mut rest = words.as_slice();
+        sum.load(0..sum.slots(), &mut rest).expect("the words of a film");
+        assert!(rest.is_empty() && bits(&sum) == whole);
+    }
 }
 
 #[test]

@@ -214,7 +214,8 @@ impl<'s> Loading<'s> {
 
     /// Takes the curves of `next` into those of this one, if they look alike: hair is thousands of shapes of one curve.
     fn absorb(&mut self, next: &mut Loading<'_>) -> bool {
-        let alike = self.shape.material == next.shape.material && self.alpha == next.alpha;
+        let looks = |loading: &Loading<'_>| (loading.shape.material, loading.alpha.clone(), loading.shape.name.clone());
+        let alike = looks(self) == looks(next);
         match (&mut self.parts[..], &mut next.parts[..]) {
             ([Part::Curves(kind, segments)], [Part::Curves(next_kind, more)]) if alike && kind == next_kind => {
                 segments.append(more);

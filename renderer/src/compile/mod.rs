@@ -1,6 +1,7 @@
 //! Description → world: the last place that may fail on input.
 
 pub mod geometry;
+pub mod names;
 pub mod origin;
 
 use crate::camera::{Camera, CameraError, Filter, rendered_pixels};

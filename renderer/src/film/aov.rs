@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::matte::{Named, RANKS};
 use super::pixel::Taken;
 use crate::integrator::Scattered;
 use crate::light::Group;
@@ -37,11 +38,15 @@ pub enum Aov {
     DenoiseNormal,
     /// `error.{R,G,B}`: standard error of the pixel, film RGB.
     Error,
+    /// `CryptoObject00.{R,G,B,A}` and so on: coverage by objects' names.
+    CryptoObject,
+    /// `CryptoMaterial00.{R,G,B,A}` and so on: coverage by materials' names.
+    CryptoMaterial,
 }
 
 impl Aov {
     /// All of them, in the order of their channels.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::Albedo,
         Self::Normal,
         Self::GeometricNormal,
@@ -56,6 +61,8 @@ impl Aov {
         Self::DenoiseAlbedo,
         Self::DenoiseNormal,
         Self::Error,
+        Self::CryptoObject,
+        Self::CryptoMaterial,
     ];
 
     /// The name that users give, which is that of its layer in a file.
@@ -75,6 +82,8 @@ impl Aov {
             Self::DenoiseAlbedo => "denoise.albedo",
             Self::DenoiseNormal => "denoise.N",
             Self::Error => "error",
+            Self::CryptoObject => "CryptoObject",
+            Self::CryptoMaterial => "CryptoMaterial",
         }
     }
 
@@ -86,6 +95,10 @@ impl Aov {
             Self::Normal | Self::GeometricNormal | Self::Position | Self::DenoiseNormal => of(name, "XYZ"),
             Self::Depth => of(name, "Z"),
             Self::SampleCount => vec![name.into()],
+            // Two ranks a layer: id and coverage, id and coverage.
+            Self::CryptoObject | Self::CryptoMaterial => {
+                (0..RANKS / 2).flat_map(|layer| of(&format!("{name}{layer:02}"), "RGBA")).collect()
+            }
             Self::Light => groups.iter().flat_map(|group| of(&format!("{name}.{group}"), "RGB")).collect(),
             Self::Albedo
             | Self::Variance
@@ -115,6 +128,8 @@ impl Aov {
             Self::DenoiseAlbedo => sum(Layer::DenoiseAlbedo),
             Self::DenoiseNormal => sum(Layer::DenoiseNormal),
             Self::Error => vec![Shown::Error],
+            Self::CryptoObject => vec![Shown::Matte(Named::Object)],
+            Self::CryptoMaterial => vec![Shown::Matte(Named::Material)],
         }
     }
 }
@@ -128,6 +143,8 @@ pub(super) enum Shown {
     Count,
     /// The standard error.
     Error,
+    /// Ids and coverages, in two channels a rank.
+    Matte(Named),
 }
 
 /// What a film shows besides radiance and coverage.
@@ -156,12 +173,22 @@ impl Outputs {
         self.aovs.iter().flat_map(|aov| aov.shown(&self.groups)).collect()
     }
 
+    /// What names are kept of.
+    pub(super) fn mattes(&self) -> Vec<Named> {
+        let shown = self.shown().into_iter();
+        let mattes = shown.filter_map(|shown| match shown {
+            Shown::Matte(named) => Some(named),
+            Shown::Sum(_) | Shown::Count | Shown::Error => None,
+        });
+        mattes.collect()
+    }
+
     /// What is summed up for them. A `filtered` film keeps what its filter needs.
     pub(super) fn layers(&self, filtered: bool) -> Vec<Layer> {
         let shown = self.shown().into_iter();
         let layers = shown.filter_map(|shown| match shown {
             Shown::Sum(layer) => Some(layer),
-            Shown::Count | Shown::Error => None,
+            Shown::Count | Shown::Error | Shown::Matte(_) => None,
         });
         layers.chain(filtered.then_some(Layer::Prefix)).collect()
     }

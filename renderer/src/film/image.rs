@@ -1,6 +1,7 @@
 //! The image that a film shows.
 
 use super::aov::Shown;
+use super::matte::RANKS;
 use super::{Aov, Film, Layer, Outputs};
 use crate::math::Rgb;
 
@@ -60,6 +61,12 @@ impl Film {
                 }
                 Shown::Error => {
                     values.extend(self.error(at).to_array());
+                    continue;
+                }
+                Shown::Matte(named) => {
+                    let coverage = (pixel.mean_alpha() as f32).clamp(0.0, 1.0);
+                    let ranks = self.matte(*named, at).map_or([(0, 0.0); RANKS], |matte| matte.ranks(coverage));
+                    values.extend(ranks.iter().flat_map(|(id, share)| [f32::from_bits(*id), *share]));
                     continue;
                 }
             };

@@ -5,15 +5,20 @@
 //! to that of all of them.
 
 mod aov;
+pub mod cryptomatte;
 pub mod exr;
 mod image;
+mod matte;
 mod pixel;
 mod sum;
 
 pub use aov::{Aov, AovSet, Layer, Outputs};
 pub use image::{Channel, Image};
+pub use matte::{Matte, Named};
 pub use pixel::{Pixel, Seen, Taken};
 pub use sum::{MOST_TERMS, Sum};
+
+use std::ops::Range;
 
 use glam::DVec3;
 
@@ -37,6 +42,10 @@ pub struct Film {
     layers: Vec<Layer>,
     /// Sums of the layers of a pixel, pixel by pixel in the same order.
     sums: Vec<Sum<3>>,
+    /// What names are kept of.
+    named: Vec<Named>,
+    /// Names in a pixel, pixel by pixel in the same order.
+    mattes: Vec<Matte>,
     /// In the same order: what the filter makes of the pixels, film RGB. Empty until then.
     filtered: Vec<Rgb>,
     /// In the same order: standard errors of the pixels. Empty until they are known.
@@ -53,6 +62,8 @@ pub struct Tile<'a> {
     pixels: &'a mut [Pixel],
     layers: &'a [Layer],
     sums: &'a mut [Sum<3>],
+    named: &'a [Named],
+    mattes: &'a mut [Matte],
 }
 
 /// A pixel of a tile.
@@ -64,6 +75,8 @@ pub struct TilePixel<'a> {
     pixel: &'a mut Pixel,
     layers: &'a [Layer],
     sums: &'a mut [Sum<3>],
+    named: &'a [Named],
+    mattes: &'a mut [Matte],
 }
 
 impl TilePixel<'_> {
@@ -76,19 +89,25 @@ impl TilePixel<'_> {
                 sum.add(layer.term(taken));
             }
         }
+        if let Some(ids) = taken.seen.and_then(|seen| seen.aside.seen()) {
+            for (named, matte) in self.named.iter().zip(self.mattes.iter_mut()) {
+                matte.add(ids[*named as usize], pixel::quanta(taken.alpha * taken.weight));
+            }
+        }
     }
 }
 
 impl Tile<'_> {
     /// Calls `visit` for each pixel of the tile that is within the film.
     pub fn for_each(&mut self, mut visit: impl FnMut(TilePixel<'_>)) {
-        let layers = self.layers;
+        let (layers, named) = (self.layers, self.named);
         let mut sums = self.sums.chunks_exact_mut(layers.len().max(1));
+        let mut mattes = self.mattes.chunks_exact_mut(named.len().max(1));
         for (offset, pixel) in (0..).zip(self.pixels.iter_mut()) {
-            let sums = sums.next().unwrap_or_default();
+            let (sums, mattes) = (sums.next().unwrap_or_default(), mattes.next().unwrap_or_default());
             let at = [self.origin[0] + offset % TILE, self.origin[1] + offset / TILE];
             if at[0] < self.bounds.max[0] && at[1] < self.bounds.max[1] {
-                visit(TilePixel { at, index: self.first + offset, pixel, layers, sums });
+                visit(TilePixel { at, index: self.first + offset, pixel, layers, sums, named, mattes });
             }
         }
     }
@@ -103,7 +122,10 @@ impl Film {
         let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
         let layers = outputs.layers(filtered);
         let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
-        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, filtered: Vec::new(), errors: Vec::new() }
+        let named = outputs.mattes();
+        let mattes = vec![Matte::default(); count * named.len()];
+        let (filtered, errors) = (Vec::new(), Vec::new());
+        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, named, mattes, filtered, errors }
     }
 
     /// Bytes that a film of this shape holds.
@@ -111,6 +133,8 @@ impl Film {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
         let result = if filtered { size_of::<Rgb>() } else { 0 };
+        // One name each, with what the allocator keeps of its own.
+        let result = result + outputs.mattes().len() * (size_of::<Matte>() + 32);
         pixels * (size_of::<Pixel>() + outputs.layers(filtered).len() * size_of::<Sum<3>>() + result) as u64
     }
 
@@ -138,6 +162,8 @@ impl Film {
     pub fn tiles(&mut self) -> Vec<Tile<'_>> {
         let (bounds, across, layers) = (self.bounds, self.tiles[0], self.layers.as_slice());
         let mut sums = self.sums.chunks_mut((TILE * TILE) as usize * layers.len().max(1));
+        let named = self.named.as_slice();
+        let mut mattes = self.mattes.chunks_mut((TILE * TILE) as usize * named.len().max(1));
         self.pixels
             .chunks_mut((TILE * TILE) as usize)
             .zip(0u32..)
@@ -148,6 +174,8 @@ impl Film {
                 pixels,
                 layers,
                 sums: sums.next().unwrap_or_default(),
+                named,
+                mattes: mattes.next().unwrap_or_default(),
             })
             .collect()
     }
@@ -163,6 +191,12 @@ impl Film {
         Some(DVec3::from_array(self.sums[self.index(at) * self.layers.len() + which].value()))
     }
 
+    /// Names in the pixel at `[x, y]`, if they are kept.
+    pub fn matte(&self, named: Named, at: [u32; 2]) -> Option<&Matte> {
+        let which = self.named.iter().position(|kept| *kept == named)?;
+        Some(&self.mattes[self.index(at) * self.named.len() + which])
+    }
+
     /// Whether samples' first hits are looked at.
     pub fn first_hit(&self) -> bool {
         self.layers.iter().any(|layer| layer.first_hit())
@@ -170,7 +204,7 @@ impl Film {
 
     /// Whether paths are watched for more than their radiance and their first hits.
     pub fn aside(&self) -> bool {
-        self.layers.iter().any(|layer| layer.aside())
+        !self.named.is_empty() || self.layers.iter().any(|layer| layer.aside())
     }
 
     /// Sets what the filter makes of all pixels, film RGB, row by row over the bounds.
@@ -211,43 +245,42 @@ impl Film {
     /// # Panics
     /// If it is not of the same shape.
     pub fn merge(&mut self, other: &Self) {
-        assert!((self.bounds, &self.layers) == (other.bounds, &other.layers), "films of different shapes");
+        let shape = |film: &Self| (film.bounds, film.layers.clone(), film.named.clone());
+        assert!(shape(self) == shape(other), "films of different shapes");
         self.pixels.iter_mut().zip(&other.pixels).for_each(|(pixel, other)| pixel.merge(other));
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
+        self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, other)| matte.merge(other));
     }
 
-    /// Bytes that a film of this shape is stored as.
+    /// Bytes that a film of this shape is stored as, without names.
     pub fn stored_bytes(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
-        pixels * 8 * (Pixel::WORDS + outputs.layers(filtered).len() * Sum::<3>::WORDS) as u64
-    }
-
-    /// Words that each pixel is stored as.
-    pub fn words_per_pixel(&self) -> usize {
-        Pixel::WORDS + self.layers.len() * Sum::<3>::WORDS
+        pixels * 8 * (Pixel::WORDS + outputs.layers(filtered).len() * Sum::<3>::WORDS + outputs.mattes().len()) as u64
     }
 
     /// Appends the words of the pixels `range`, by their indices, to be stored.
-    pub fn store(&self, range: std::ops::Range<usize>, words: &mut Vec<u64>) {
-        let layers = self.layers.len();
+    pub fn store(&self, range: Range<usize>, words: &mut Vec<u64>) {
+        let (layers, named) = (self.layers.len(), self.named.len());
         for index in range {
             self.pixels[index].store(words);
             self.sums[index * layers..(index + 1) * layers].iter().for_each(|sum| sum.store(words));
+            self.mattes[index * named..(index + 1) * named].iter().for_each(|matte| matte.store(words));
         }
     }
 
-    /// Adds the samples of pixels that another film has stored, from the index `first` on. `None`, with some of them added,
-    /// where no film has such words.
-    pub fn load(&mut self, first: usize, mut words: &[u64]) -> Option<()> {
-        let layers = self.layers.len();
-        let mut index = first;
-        while !words.is_empty() {
-            self.pixels.get_mut(index)?.merge(&Pixel::load(&mut words)?);
+    /// Takes what [`Self::store`] appended for the pixels `range` off the front, and adds their samples. `None`, with some of
+    /// them added, where no film has such words.
+    pub fn load(&mut self, range: Range<usize>, words: &mut &[u64]) -> Option<()> {
+        let (layers, named) = (self.layers.len(), self.named.len());
+        for index in range {
+            self.pixels.get_mut(index)?.merge(&Pixel::load(words)?);
             for sum in &mut self.sums[index * layers..(index + 1) * layers] {
-                sum.merge(&Sum::load(&mut words)?);
+                sum.merge(&Sum::load(words)?);
             }
-            index += 1;
+            for matte in &mut self.mattes[index * named..(index + 1) * named] {
+                matte.merge(&Matte::load(words)?);
+            }
         }
         Some(())
     }
@@ -318,16 +351,15 @@ mod tests {
         let words = |film: &Film| {
             let mut words = Vec::new();
             film.store(0..film.slots(), &mut words);
-            assert_eq!(words.len(), film.slots() * film.words_per_pixel());
             words
         };
         let whole = words(&film(0..9));
         let mut sum = film(4..9);
-        sum.load(0, &words(&film(0..4))).unwrap();
+        sum.load(0..sum.slots(), &mut &words(&film(0..4))[..]).unwrap();
         assert!(words(&sum) == whole);
         let mut sum = film(0..4);
         sum.merge(&film(4..9));
         assert!(words(&sum) == whole);
-        assert_eq!(film(0..1).load(0, &whole[1..]), None);
+        assert_eq!(film(0..1).load(0..sum.slots(), &mut &whole[1..]), None);
     }
 }

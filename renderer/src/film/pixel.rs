@@ -29,7 +29,7 @@ pub struct Taken<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// In scene RGB.
-    pub aside: &'a Aside,
+    pub aside: &'a Aside<'a>,
     /// Film RGB from scene RGB, as the sensor takes this sample.
     pub film_from_scene: Mat3,
 }
@@ -75,7 +75,7 @@ pub struct Pixel {
 const WEIGHT_BITS: i32 = 36;
 
 /// A weight in quanta.
-fn quanta(weight: f32) -> i64 {
+pub(super) fn quanta(weight: f32) -> i64 {
     (f64::from(weight.clamp(-16.0, 16.0)) * 2f64.powi(WEIGHT_BITS)).round() as i64
 }
 

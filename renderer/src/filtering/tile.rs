@@ -15,31 +15,33 @@ pub trait Keeper: Send {
     fn keep(&mut self, recorder: &Self::Recorder, sample: Keep) -> Rgb;
     /// What a recorder has seen besides, if anybody wants to know.
     #[inline]
-    fn aside<'r>(&self, _recorder: &'r Self::Recorder) -> Option<&'r Aside> {
+    fn aside<'r>(&self, _recorder: &'r Self::Recorder) -> Option<&'r Aside<'r>> {
         None
     }
 }
 
 /// Keeps what another keeper does, and looks aside.
-pub struct Watching<K> {
+pub struct Watching<'w, K> {
     /// The other one.
     pub keeper: K,
     /// How many groups of lights are told apart.
     pub groups: usize,
+    /// Ids of the names of objects and materials, by surface.
+    pub ids: &'w [[u32; 2]],
 }
 
-impl<K: Keeper> Keeper for Watching<K> {
-    type Recorder = (K::Recorder, Aside);
+impl<'w, K: Keeper> Keeper for Watching<'w, K> {
+    type Recorder = (K::Recorder, Aside<'w>);
     #[inline]
     fn recorder(&self) -> Self::Recorder {
-        (self.keeper.recorder(), Aside::new(self.groups))
+        (self.keeper.recorder(), Aside::new(self.groups, self.ids))
     }
     #[inline]
     fn keep(&mut self, recorder: &Self::Recorder, sample: Keep) -> Rgb {
         self.keeper.keep(&recorder.0, sample)
     }
     #[inline]
-    fn aside<'r>(&self, recorder: &'r Self::Recorder) -> Option<&'r Aside> {
+    fn aside<'r>(&self, recorder: &'r Self::Recorder) -> Option<&'r Aside<'r>> {
         Some(&recorder.1)
     }
 }

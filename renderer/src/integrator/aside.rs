@@ -33,7 +33,11 @@ pub struct Feature {
 /// Reflection and refraction are drawn in proportion to what they carry, so that over many paths a pane shows what is
 /// behind it and what it mirrors as they are seen.
 #[derive(Clone, Debug, Default)]
-pub struct Aside {
+pub struct Aside<'w> {
+    /// Ids of the names of objects and materials, by surface; empty if nobody wants to know.
+    ids: &'w [[u32; 2]],
+    /// Those of the first hit.
+    seen: Option<[u32; 2]>,
     /// Light of each class, by [`Scattered`].
     classes: [Rgb; 3],
     /// Light of each group; empty if there is none to be told apart.
@@ -48,10 +52,11 @@ pub struct Aside {
     bounces: u32,
 }
 
-impl Aside {
-    /// A path that begins, with as many groups of lights to be told apart.
-    pub fn new(groups: usize) -> Self {
-        Self { groups: vec![Rgb::ZERO; groups], beta: Rgb::ONE, squeezed: 1.0, worth: 1.0, ..Self::default() }
+impl<'w> Aside<'w> {
+    /// A path that begins, with as many groups of lights to be told apart, and `ids` of the names of each surface's object and
+    /// material.
+    pub fn new(groups: usize, ids: &'w [[u32; 2]]) -> Self {
+        Self { ids, groups: vec![Rgb::ZERO; groups], beta: Rgb::ONE, squeezed: 1.0, worth: 1.0, ..Self::default() }
     }
 
     /// Light of a class, scene RGB.
@@ -62,6 +67,11 @@ impl Aside {
     /// Light of a group, scene RGB.
     pub fn group(&self, group: Group) -> Rgb {
         self.groups.get(group.0 as usize).copied().unwrap_or_default()
+    }
+
+    /// Ids of the names of the object and the material of the first hit.
+    pub fn seen(&self) -> Option<[u32; 2]> {
+        self.seen
     }
 
     /// The first rough surface; black where there is none.
@@ -82,8 +92,11 @@ impl Aside {
     }
 }
 
-impl Recorder for Aside {
+impl Recorder for Aside<'_> {
     fn arrive(&mut self, vertex: &Vertex<'_>, _: f32) {
+        if self.bounces == 0 {
+            self.seen = self.ids.get(vertex.surface.geometry as usize).copied();
+        }
         if self.feature.is_none() && !vertex.shading.bsdf.is_specular() {
             let albedo = vertex.shading.bsdf.albedo(vertex.wo) * self.beta * self.squeezed;
             let side = if vertex.wo.cos_theta() < 0.0 { -1.0 } else { 1.0 };

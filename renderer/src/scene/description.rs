@@ -632,6 +632,8 @@ pub struct Shape {
     pub area_light: Option<AreaLightId>,
     /// Probability of a hit being real.
     pub alpha: Option<Value<f32>>,
+    /// Its name, if it has one.
+    pub name: Option<Arc<str>>,
     /// Medium inside and outside.
     pub media: [Option<MediumId>; 2],
     /// Where it was described.

@@ -58,6 +58,7 @@ fn shape(kind: ShapeKind) -> Shape {
         material: MaterialId(0),
         area_light: None,
         alpha: None,
+        name: None,
         media: [None; 2],
         span: Span::default(),
     }

@@ -145,6 +145,8 @@ impl Reader {
         let world_from_shape = self.placed("shape", span);
         let kind = shapes::build(&mut self.cx, &mut params);
         let alpha = shapes::alpha(&mut self.cx, &mut params);
+        // Not pbrt's: what mattes know the shape by.
+        let name = params.string(&mut self.cx, "name").filter(|name| !name.is_empty()).map(Arc::from);
         params.finish(&mut self.cx);
         let mut area_light = self.state.area_light.map(AreaLightId);
         if self.open_object.is_some() && area_light.take().is_some() {
@@ -159,6 +161,7 @@ impl Reader {
             material: MaterialId(self.state.material),
             area_light,
             alpha,
+            name,
             media: self.state.media,
             span,
         };
