@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use renderer::film::AovSet;
+use renderer::film::{Aov, AovSet, exr};
 use renderer::render::Slice;
 
 use crate::checkpoint::Interval;
@@ -250,12 +250,46 @@ pub struct ChannelArguments {
     /// Auxiliary channels to write besides R G B A, or "all", which is all but the standard error of the pixels, "error"
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov_names())]
     pub aov: Vec<String>,
+    /// How it is stored.
+    #[command(flatten)]
+    pub encoding: EncodingArguments,
     /// Write counts, times and memory to a JSON file
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
     /// Record host, date, time and memory in the image: files then differ from run to run
     #[arg(long)]
     pub provenance: bool,
+}
+
+/// How images are stored.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub struct EncodingArguments {
+    /// Compression of the image: all but dwaa keep every bit
+    #[arg(long, value_name = "KIND", value_enum, default_value_t)]
+    pub compression: CompressionKind,
+    /// Layers to store in 16 bits: names of --aov, or "rgba"
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = layer_names(false))]
+    pub half: Vec<String>,
+    /// Layers to store in 32 bits: names of --aov, or "rgba" [default: all but rgba]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = layer_names(true))]
+    pub float: Vec<String>,
+}
+
+/// Compression of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum CompressionKind {
+    /// Deflate of 16 rows
+    #[default]
+    Zip,
+    /// Deflate of single rows: quick for compositors that read by rows
+    Zips,
+    /// Wavelets: small for noisy pictures
+    Piz,
+    /// Lossy, and much smaller; not with Cryptomatte
+    Dwaa,
+    /// None
+    None,
 }
 
 /// How it runs.
@@ -399,6 +433,9 @@ pub struct MergeArguments {
     /// Record host, date and memory in the image: files then differ from run to run
     #[arg(long)]
     pub provenance: bool,
+    /// How the image is stored.
+    #[command(flatten)]
+    pub encoding: EncodingArguments,
     /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
@@ -453,6 +490,12 @@ impl FromStr for Resolution {
         }
         Ok(Self([width, height]))
     }
+}
+
+/// Layers whose format may be chosen; ids take 32 bits.
+fn layer_names(mattes: bool) -> PossibleValuesParser {
+    let aovs = Aov::ALL.into_iter().filter(move |aov| mattes || !aov.is_matte()).map(Aov::name);
+    PossibleValuesParser::new(std::iter::once(exr::RADIANCE).chain(aovs))
 }
 
 fn aov_names() -> PossibleValuesParser {

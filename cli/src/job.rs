@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use oiio::Compression;
+use renderer::film::AovSet;
+use renderer::film::exr::Encoding;
 use renderer::filtering::Filtering;
 use renderer::render::RenderError;
 use renderer::scene::Severity;
 
-use crate::args::{FilterArguments, FilterKind, RenderArguments};
+use crate::args::{CompressionKind, EncodingArguments, FilterArguments, FilterKind, RenderArguments};
 use crate::exit::Failure;
 use crate::frame_name;
 use crate::log::Log;
@@ -160,6 +163,31 @@ pub fn exif_date(seconds: u64) -> String {
     let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
     let year = 400 * era + year_of_era + u64::from(month <= 2);
     format!("{year:04}:{month:02}:{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
+}
+
+/// How an image is to be stored.
+pub fn encoding(arguments: &EncodingArguments) -> Encoding {
+    let compression = match arguments.compression {
+        CompressionKind::Zip => Compression::Zip,
+        CompressionKind::Zips => Compression::Zips,
+        CompressionKind::Piz => Compression::Piz,
+        CompressionKind::Dwaa => Compression::Dwaa,
+        CompressionKind::None => Compression::None,
+    };
+    Encoding { compression, half: arguments.half.clone(), float: arguments.float.clone() }
+}
+
+/// Refuses to damage what is to be stored.
+///
+/// # Errors
+/// Ids would not survive.
+pub fn check_encoding(encoding: &Encoding, aovs: AovSet) -> Result<(), Failure> {
+    if encoding.damages(aovs) {
+        let text = "--compression dwaa alters the ids of Cryptomatte: choose zip, zips, piz or none, or write the mattes to a \
+                    file of their own";
+        return Err(Failure::Usage(text.into()));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

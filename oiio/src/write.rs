@@ -17,7 +17,7 @@ pub enum FileFormat {
     Png,
 }
 
-/// Lossless compression of OpenEXR. Lossy kinds are not offered: they damage the numbers in auxiliary channels.
+/// Compression of OpenEXR, lossless but for one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
     /// None.
@@ -31,6 +31,8 @@ pub enum Compression {
     Zip,
     /// Wavelets: small for noisy pictures.
     Piz,
+    /// Lossy: cosine transforms of channels named R, G and B, in any layer. Numbers that are not light are damaged there.
+    Dwaa,
 }
 
 /// One channel of an image to be written.
@@ -114,6 +116,7 @@ impl Compression {
             Self::Zips => "zips",
             Self::Zip => "zip",
             Self::Piz => "piz",
+            Self::Dwaa => "dwaa",
         }
     }
 }

@@ -31,6 +31,8 @@ pub fn run(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     let start = Instant::now();
     let parts = arguments.parts.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>().map_err(refused)?;
     let missing = check(&parts)?;
+    let encoding = job::encoding(&arguments.encoding);
+    parts.first().map_or(Ok(()), |part| job::check_encoding(&encoding, part.description.aovs))?;
     if let Some(missing) = missing.filter(|_| !to_part && !arguments.partial) {
         return Err(Failure::Input(format!(
             "samples {}:{} of {} are in none of the parts; add the part that has them, or give --partial for an image of \
@@ -63,7 +65,8 @@ pub fn run(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }
-    exr::write(&frame.film, metadata::of_frame(&frame, error.as_ref(), arguments.provenance), file.target())
+    let attributes = metadata::of_frame(&frame, error.as_ref(), arguments.provenance);
+    exr::write_as(&frame.film, attributes, &encoding, file.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     tell(log, output, count, &frame.samples, start);
     Ok(())

@@ -44,6 +44,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         log.info(&format!("{} is there and complete: nothing to do", path.display()));
         return Ok(());
     }
+    let encoding = job::encoding(&arguments.channels.encoding);
     let output = OutputFile::prepare(&path)?;
     let named = |path: &Path| job::named(path, arguments.frame.unwrap_or(1));
     let stats_file = arguments.channels.stats.as_deref().map(|path| OutputFile::prepare(&named(path))).transpose()?;
@@ -65,12 +66,14 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         memory: MemoryLimit { bytes: arguments.run.memory_limit, reached: AtomicBool::new(false) },
         output: &output,
         watch,
+        encoding: &encoding,
     };
     if let Err(why) = reporter.interrupt.listen() {
         log.warning(&format!("signals will end the render without an image: {why}"));
     }
     let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
     let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
+    job::check_encoding(&encoding, prepared.description.aovs)?;
     render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
     reporter.memory.check(render::least_memory(&prepared))?;
     let begun = reporter.checkpoints.begin(&prepared.description)?;
@@ -95,8 +98,8 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     };
     if !job::is_part(&path) {
         let attributes = metadata::of_frame(&frame, error.as_ref(), arguments.channels.provenance);
-        losses =
-            exr::write(&frame.film, attributes, output.target()).map_err(|error| Failure::Output(error.to_string()))?;
+        losses = exr::write_as(&frame.film, attributes, &encoding, output.target())
+            .map_err(|error| Failure::Output(error.to_string()))?;
     }
     let outcome = Outcome { path: &path, losses, error, write_seconds: start.elapsed().as_secs_f64() };
 
@@ -183,6 +186,7 @@ struct Reporter<'a> {
     memory: MemoryLimit,
     output: &'a OutputFile,
     watch: Option<Watch>,
+    encoding: &'a exr::Encoding,
 }
 
 /// How much memory may be in use.
@@ -278,7 +282,7 @@ impl Reporter<'_> {
         } else {
             frame.develop();
             let attributes = metadata::of_accumulation(frame);
-            exr::write(&frame.film, attributes, path).map(drop).map_err(|error| error.to_string())
+            exr::write_as(&frame.film, attributes, self.encoding, path).map(drop).map_err(|error| error.to_string())
         };
         match written {
             Ok(()) => self.log.info(&format!("snapshot of samples {} in {}", frame.samples, path.display())),

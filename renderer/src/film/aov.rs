@@ -87,6 +87,11 @@ impl Aov {
         }
     }
 
+    /// Whether its channels hold ids, of which every bit counts.
+    pub fn is_matte(self) -> bool {
+        matches!(self, Self::CryptoObject | Self::CryptoMaterial)
+    }
+
     /// Names of its channels in a file.
     pub fn channels(self, groups: &[Arc<str>]) -> Vec<String> {
         let name = self.name();

@@ -28,6 +28,41 @@ pub enum WriteError {
     },
 }
 
+/// How an image is stored.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Encoding {
+    /// Of the whole file.
+    pub compression: Compression,
+    /// Layers in 16 bits rather than what is usual for them, by the names of outputs; [`RADIANCE`] for the root.
+    pub half: Vec<String>,
+    /// Layers in 32 bits.
+    pub float: Vec<String>,
+}
+
+/// What [`Encoding`] calls the channels R, G, B and A.
+pub const RADIANCE: &str = "rgba";
+
+impl Encoding {
+    fn format(&self, channel: &super::Channel) -> Format {
+        let name = channel.name.as_str();
+        let within = |layer: &String| match name.strip_prefix(layer.as_str()) {
+            Some(rest) => rest.is_empty() || rest.starts_with('.'),
+            None => layer == RADIANCE && ["R", "G", "B", "A"].contains(&name),
+        };
+        match (self.half.iter().any(within), self.float.iter().any(within)) {
+            (true, _) => Format::Half,
+            (false, true) => Format::Float,
+            (false, false) if channel.float => Format::Float,
+            (false, false) => Format::Half,
+        }
+    }
+
+    /// Whether it would damage one of these outputs: ids must keep every bit.
+    pub fn damages(&self, aovs: super::AovSet) -> bool {
+        self.compression == Compression::Dwaa && aovs.iter().any(super::Aov::is_matte)
+    }
+}
+
 /// What was lost on the way to the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Losses {
@@ -37,6 +72,14 @@ pub struct Losses {
     pub clamped_half: u64,
 }
 
+/// Writes the film's image to `path` as is usual.
+///
+/// # Errors
+/// As [`write_as`].
+pub fn write(film: &Film, attributes: Vec<(String, Attribute)>, path: &Path) -> Result<Losses, WriteError> {
+    write_as(film, attributes, &Encoding::default(), path)
+}
+
 /// Writes the film's image to `path`, with `attributes` as its metadata.
 ///
 /// The file appears under its name only when it is whole: it is written beside it as `.NAME.part-PID`, synced, and
@@ -44,7 +87,12 @@ pub struct Losses {
 ///
 /// # Errors
 /// The folder is absent or not writable, or the disk is full; then there is no new file, and an old one is untouched.
-pub fn write(film: &Film, attributes: Vec<(String, Attribute)>, path: &Path) -> Result<Losses, WriteError> {
+pub fn write_as(
+    film: &Film,
+    attributes: Vec<(String, Attribute)>,
+    encoding: &Encoding,
+    path: &Path,
+) -> Result<Losses, WriteError> {
     let image = film.image();
     let (bounds, [width, height]) = (film.bounds(), film.resolution());
     let file_error = |why| WriteError::File { path: path.to_owned(), why };
@@ -62,14 +110,11 @@ pub fn write(film: &Film, attributes: Vec<(String, Attribute)>, path: &Path) -> 
         channels: image
             .channels
             .iter()
-            .map(|channel| Channel {
-                name: channel.name.clone(),
-                format: if channel.float { Format::Float } else { Format::Half },
-            })
+            .map(|channel| Channel { name: channel.name.clone(), format: encoding.format(channel) })
             .collect(),
         pixels: &image.values,
         attributes,
-        compression: Compression::Zip,
+        compression: encoding.compression,
     };
     let written = oiio::write(&output)
         .map_err(|why| WriteError::Image { path: path.to_owned(), why })
@@ -130,6 +175,16 @@ mod tests {
         let first = std::fs::read(&path).unwrap();
         write(&film, attributes, &path).unwrap();
         assert!(first == std::fs::read(&path).unwrap(), "the bytes differ from run to run");
+    }
+
+    #[test]
+    fn layers_are_stored_as_they_are_asked_for() {
+        let layers = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let encoding = Encoding { half: layers(&["N", "light"]), float: layers(&[RADIANCE]), ..Encoding::default() };
+        let of = |name: &str, float| encoding.format(&super::super::Channel { name: name.into(), float });
+        assert_eq!(["R", "A"].map(|name| of(name, false)), [Format::Float; 2]);
+        assert_eq!(["N.X", "light.key.R"].map(|name| of(name, true)), [Format::Half; 2]);
+        assert_eq!(["Ng.X", "albedo.R", "denoise.N.X"].map(|name| of(name, true)), [Format::Float; 3]);
     }
 
     #[test]
