@@ -41,6 +41,8 @@ pub enum Command {
     Merge(MergeArguments),
     /// Measure how far an image is from a reference
     Compare(CompareArguments),
+    /// Denoise an image with Intel Open Image Denoise, into another file
+    Denoise(DenoiseArguments),
     /// Turn an image into a PNG for looking at
     Preview(PreviewArguments),
     /// Measure what time buys: a scene over budgets and settings, as one page
@@ -439,6 +441,23 @@ pub struct MergeArguments {
     /// Threads; 0: SLURM_CPUS_PER_TASK, else as many as this process may use
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     pub threads: usize,
+}
+
+/// Options of `denoise`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Example:
+  tessera render scene.pbrt -o noisy.exr --filter none --aov denoise.albedo,denoise.N
+  tessera denoise noisy.exr -o clean.exr")]
+pub struct DenoiseArguments {
+    /// The noisy image; its layers denoise.albedo and denoise.N, or else albedo and N, guide the denoiser
+    pub image: PathBuf,
+    /// The denoised image, *.exr: R G B A and metadata, another file than the noisy one
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// The program oidnDenoise [default: OIDN_DENOISE, else the one on the PATH]
+    #[arg(long, value_name = "FILE")]
+    pub oidn: Option<PathBuf>,
 }
 
 /// Options of `preview`.

@@ -16,6 +16,7 @@ mod job;
 mod log;
 mod metadata;
 mod metric;
+mod oidn;
 mod output;
 mod picture;
 mod progress;

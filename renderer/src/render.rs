@@ -332,7 +332,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
     let mattes = [film::Aov::CryptoObject, film::Aov::CryptoMaterial].map(|aov| aovs.contains(aov));
-    let names = mattes.contains(&true).then(|| Names::new(&description, &world.geometry)).unwrap_or_default();
+    let names = if mattes.contains(&true) { Names::new(&description, &world.geometry) } else { Names::default() };
     let ids = names.objects.iter().zip(&names.materials).map(|(object, material)| [id(object), id(material)]).collect();
     let manifest = |(shown, names): (bool, &[Arc<str>])| if shown { sorted(names) } else { Vec::new() };
     let named = [(mattes[0], &names.objects[..]), (mattes[1], &names.materials[..])];

@@ -1,6 +1,7 @@
 //! The commands, one file each.
 
 mod compare;
+mod denoise;
 mod info;
 mod merge;
 mod preview;
@@ -29,6 +30,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Info(arguments) => info::run(arguments, &log),
         Command::Merge(arguments) => merge::run(arguments, &log),
         Command::Compare(arguments) => compare::run(arguments, &log),
+        Command::Denoise(arguments) => denoise::run(arguments, &log),
         Command::Preview(arguments) => preview::run(arguments, &log),
         Command::Study(arguments) => study::run(arguments, &log),
     });

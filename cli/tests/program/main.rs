@@ -1,6 +1,7 @@
 //! The program from outside: exit codes, streams, files.
 
 mod compare;
+mod denoise;
 mod info;
 mod merge;
 mod preview;
