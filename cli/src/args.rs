@@ -45,6 +45,8 @@ pub enum Command {
     Denoise(DenoiseArguments),
     /// Turn an image into a PNG for looking at
     Preview(PreviewArguments),
+    /// Show what a render took as a page, from its statistics
+    Report(ReportArguments),
     /// Measure what time buys: a scene over budgets and settings, as one page
     Study(StudyArguments),
 }
@@ -458,6 +460,23 @@ pub struct DenoiseArguments {
     /// The program oidnDenoise [default: OIDN_DENOISE, else the one on the PATH]
     #[arg(long, value_name = "FILE")]
     pub oidn: Option<PathBuf>,
+}
+
+/// Options of `report`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "\
+Example:
+  tessera render scene.pbrt -o a.exr --stats a.json
+  tessera report a.json -o a.html")]
+pub struct ReportArguments {
+    /// The statistics that `render --stats` wrote
+    pub stats: PathBuf,
+    /// The page, *.html: one file with everything in it
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// The image to show [default: the one that the statistics name]
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Options of `preview`.

@@ -6,6 +6,7 @@ mod info;
 mod merge;
 mod preview;
 mod render;
+mod report;
 mod study;
 
 use std::io::{self, Write};
@@ -32,6 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Compare(arguments) => compare::run(arguments, &log),
         Command::Denoise(arguments) => denoise::run(arguments, &log),
         Command::Preview(arguments) => preview::run(arguments, &log),
+        Command::Report(arguments) => report::run(arguments, &log),
         Command::Study(arguments) => study::run(arguments, &log),
     });
     result.inspect_err(|failure| log.error(&failure.to_string()))

@@ -355,7 +355,8 @@ fn scene_name(study: &Study<'_>) -> String {
     if stem.starts_with("scene") { folder.unwrap_or(stem) } else { stem }
 }
 
-fn escaped(text: &str) -> String {
+/// Text as HTML shows it.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
