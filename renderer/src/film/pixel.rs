@@ -84,6 +84,12 @@ fn weight(quanta: i64) -> f64 {
     quanta as f64 * 2f64.powi(-WEIGHT_BITS)
 }
 
+/// What a sum of `n` samples is divided by.
+fn normalisation(weight: f64, n: f64) -> f64 {
+    // Half the expected sum: a smaller one has lost most of its digits to cancellation.
+    if weight > 0.5 * n { weight } else { n }
+}
+
 impl Pixel {
     /// Words that a pixel is stored as.
     pub const WORDS: usize = 2 * Sum::<3>::WORDS + 4;
@@ -116,16 +122,17 @@ impl Pixel {
         even + odd
     }
 
-    /// Means of even and of odd samples, film RGB: independent of each other. `None` without both.
+    /// Means of even and of odd samples, film RGB: independent of each other. `None` for a single sample: consecutive ones
+    /// are of both.
     pub fn halves(&self) -> Option<[DVec3; 2]> {
-        let weights = self.weights.map(weight);
-        let means = [0, 1].map(|half| DVec3::from_array(self.halves[half].value()) / weights[half]);
-        (weights[0] > 0.0 && weights[1] > 0.0).then_some(means)
+        let normalisations = self.half_normalisations();
+        let mean = |half: usize| DVec3::from_array(self.halves[half].value()) / normalisations[half];
+        (self.count > 1).then(|| [mean(0), mean(1)])
     }
 
-    /// Σ w of even and of odd samples.
-    pub fn half_weights(&self) -> [f64; 2] {
-        self.weights.map(weight)
+    /// What sums of even and of odd samples are divided by.
+    pub fn half_normalisations(&self) -> [f64; 2] {
+        self.weights.map(|quanta| normalisation(weight(quanta), 0.5 * f64::from(self.count.max(1))))
     }
 
     /// Number of samples.
@@ -163,10 +170,7 @@ impl Pixel {
 
     /// What sums are divided by.
     pub fn normalisation(&self) -> f64 {
-        let n = f64::from(self.count.max(1));
-        let weight = weight(self.weights[0].saturating_add(self.weights[1]));
-        // Half the expected sum: a smaller one has lost most of its digits to cancellation.
-        if weight > 0.5 * n { weight } else { n }
+        normalisation(weight(self.weights[0].saturating_add(self.weights[1])), f64::from(self.count.max(1)))
     }
 
     /// Appends the pixel's [`Self::WORDS`], to be stored.
@@ -215,6 +219,13 @@ mod tests {
         let mut pixel = Pixel::default();
         (0..16).for_each(|k| pixel.add(&taken(k, Rgb::ONE, if k % 8 == 0 { -1.25 } else { 1.25 })));
         assert_eq!(pixel.mean(), DVec3::ONE);
+    }
+
+    #[test]
+    fn halves_whose_weights_cancel_are_there_and_finite() {
+        let mut pixel = Pixel::default();
+        [1.0, -1.25, 1.0, 1.25].into_iter().zip(0..).for_each(|(w, k)| pixel.add(&taken(k, Rgb::ONE, w)));
+        assert!(pixel.halves().unwrap().iter().all(|half| half.is_finite() && half.abs().max_element() <= 1.0));
     }
 
     #[test]

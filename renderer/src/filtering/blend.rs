@@ -69,7 +69,7 @@ impl Pixel {
         let scale = 1.0 / pixel.normalisation();
         let sums = |sum: Vec3| expose(sum) * scale as f32;
         let [even, odd] = resolved.glossy_own.map(&expose);
-        let [even_weight, odd_weight] = pixel.half_weights().map(|weight| weight as f32);
+        let [even_weight, odd_weight] = pixel.half_normalisations().map(|weight| weight as f32);
         let halves = pixel.halves();
         Self {
             own: pixel.mean().as_vec3(),
