@@ -12,9 +12,12 @@ use renderer::render::Slice;
 
 use crate::checkpoint::Interval;
 use crate::exit;
+use crate::frames::Frames;
 
+mod farm;
 mod study;
 
+pub use farm::{FarmArguments, FarmEngine, OpenjdArguments, SequenceArguments, SlurmArguments};
 pub use study::StudyArguments;
 
 /// Renders pbrt-v4 scenes by path tracing.
@@ -39,6 +42,8 @@ pub enum Command {
     Info(InfoArguments),
     /// Add parts of a frame's samples up to the frame
     Merge(MergeArguments),
+    /// Hand a sequence of frames to a farm: job files for Open Job Description or Slurm
+    Farm(FarmArguments),
     /// Measure how far an image is from a reference
     Compare(CompareArguments),
     /// Denoise an image with Intel Open Image Denoise, into another file
@@ -71,8 +76,8 @@ Examples:
   Draft at a quarter of the samples, half the size:
     tessera render kitchen/scene-v4.pbrt -o draft.exr --spp 64 --resolution 640x360
 
-  Frame 12 of a shot, with the channels that denoisers and compositors want:
-    tessera render shot.0012.pbrt -o out/shot.####.exr --frame 12 --aov albedo,N,depth
+  Every second frame of a shot, with the channels that denoisers and compositors want:
+    tessera render shot.####.pbrt -o out/shot.####.exr --frames 1-48x2 --aov albedo,N,depth
 
   The second of four slices of a frame's samples, to be added to the others by \"tessera merge\":
     tessera render shot.pbrt -o out/shot.1.part --spp 1024 --slice 1/4 --progress alf
@@ -101,7 +106,7 @@ Standard output carries lines for machines only (--progress), standard error lin
 #[derive(Clone, Debug, Args)]
 #[command(after_long_help = format!("{RENDER_HELP}\n\n{}", exit::HELP), after_help = "--help says more, with examples.")]
 pub struct RenderArguments {
-    /// The scene, a pbrt-v4 file
+    /// The scene, a pbrt-v4 file. With --frame or --frames, #### or %04d in its name become the frame number
     pub scene: PathBuf,
     /// The image to write, *.exr, or *.part for "tessera merge". #### or %04d in its name become the frame number
     #[arg(short, long, value_name = "FILE")]
@@ -109,6 +114,9 @@ pub struct RenderArguments {
     /// Number of the frame, for the output's name; the seed is mixed with it [default: 1, and the seed as it is]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub frame: Option<i32>,
+    /// Several frames one after the other: 1-10, 1-10:2 or 1-10x2, 1..10, lists of these
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true, conflicts_with = "frame")]
+    pub frames: Option<Frames>,
 
     /// How good the picture gets.
     #[command(flatten)]
@@ -143,7 +151,7 @@ pub struct CheckpointArguments {
     /// Whether to go on from the checkpoint
     #[arg(long, value_name = "WHEN", value_enum, default_value_t, requires = "checkpoint")]
     pub resume: Resume,
-    /// Do nothing if the output is there and complete
+    /// Do not render what is there, complete, of the same scene and settings
     #[arg(long)]
     pub skip_existing: bool,
 }
@@ -425,12 +433,15 @@ Example:
 
 Exit codes: 0 the output is complete; 3 a part cannot be read or does not fit the others; 4 the output cannot be written")]
 pub struct MergeArguments {
-    /// The parts
+    /// The parts. With --frames, #### or %04d in their names and the output's become the frame number
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
     /// What to write: *.exr for the image, *.part for one part in place of several
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Merge several frames one after the other: 1-10, 1-10:2 or 1-10x2, 1..10, lists of these
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub frames: Option<Frames>,
     /// Make an image of what there is even if samples are missing
     #[arg(long)]
     pub partial: bool,

@@ -42,6 +42,20 @@ pub fn named(path: &Path, frame: i32) -> PathBuf {
     frame_name::with_frame(path, frame)
 }
 
+/// Makes sure that frames do not overwrite each other.
+///
+/// # Errors
+/// Two frames have the same name.
+pub fn distinct(output: &Path, frames: &[i32]) -> Result<(), Failure> {
+    match *frames {
+        [first, second, ..] if named(output, first) == named(output, second) => Err(Failure::Usage(format!(
+            "all frames would be written to \"{}\": put #### where their number belongs in the file's name",
+            output.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Makes sure that a name ends as the kind of file that will be written.
 ///
 /// # Errors
@@ -74,8 +88,8 @@ pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
 pub fn filtering(arguments: &FilterArguments) -> Result<Filtering, Failure> {
     if arguments.temporal.is_some() {
         return Err(Failure::Usage(
-            "--temporal averages over the frames of a sequence, and a sequence cannot be rendered in one run yet: leave it \
-             out, and every frame is filtered by itself"
+            "--temporal averages over the frames of a sequence, and frames know nothing of each other yet: leave it out, and \
+             every frame is filtered by itself"
                 .into(),
         ));
     }

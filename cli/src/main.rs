@@ -10,6 +10,7 @@ mod commands;
 mod exit;
 mod flip;
 mod frame_name;
+mod frames;
 mod interrupt;
 mod inventory;
 mod job;

@@ -34,7 +34,6 @@ pub fn of_accumulation(frame: &Accumulation) -> Vec<(String, Attribute)> {
 }
 
 fn of_samples(description: &FrameDescription, samples: &Samples) -> Vec<(String, Attribute)> {
-    let complete = samples.missing(&description.asked).is_empty();
     let text = |text: String| Attribute::Text(text);
     let mut attributes = vec![
         ("Software".into(), text(job::software())),
@@ -46,11 +45,7 @@ fn of_samples(description: &FrameDescription, samples: &Samples) -> Vec<(String,
         ("tessera/integrator".into(), text("path".into())),
         ("tessera/seed".into(), text(description.seed.to_string())),
         ("tessera/frame".into(), Attribute::Int(description.number)),
-        ("tessera/sampleRange".into(), text(samples.to_string())),
         ("tessera/filter".into(), text(filter_settings(&description.filtering))),
-        ("tessera/complete".into(), Attribute::Int(complete.into())),
-        ("tessera/sceneHash".into(), text(format!("{:016x}", description.scene_hash))),
-        ("tessera/settingsHash".into(), text(format!("{:016x}", settings_hash(description)))),
     ];
     for (aov, names) in [Aov::CryptoObject, Aov::CryptoMaterial].into_iter().zip(&description.names) {
         if description.aovs.contains(aov) {
@@ -58,11 +53,23 @@ fn of_samples(description: &FrameDescription, samples: &Samples) -> Vec<(String,
             attributes.extend(entries.map(|(key, value)| (key, text(value))));
         }
     }
+    attributes.extend(identity(description, samples).map(|(name, value)| (name.to_owned(), value)));
     if let Some(ndc_from_world) = description.ndc_from_world {
         let matrix = Attribute::Matrix(ndc_from_world.as_mat4().to_cols_array());
         attributes.push(("worldtoNDC".into(), matrix));
     }
     attributes
+}
+
+/// What tells the image from all others: which samples of what.
+pub fn identity(description: &FrameDescription, samples: &Samples) -> [(&'static str, Attribute); 4] {
+    let complete = samples.missing(&description.asked).is_empty();
+    [
+        ("tessera/sampleRange", Attribute::Text(samples.to_string())),
+        ("tessera/complete", Attribute::Int(complete.into())),
+        ("tessera/sceneHash", Attribute::Text(format!("{:016x}", description.scene_hash))),
+        ("tessera/settingsHash", Attribute::Text(format!("{:016x}", settings_hash(description)))),
+    ]
 }
 
 /// Chromaticities of red, green, blue and white: ITU-R BT.709.

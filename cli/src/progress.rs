@@ -22,6 +22,8 @@ const BAR_LENGTH: u64 = 1000;
 pub struct Progress<'a> {
     log: &'a Log,
     kind: Kind,
+    /// How many images the job is to make.
+    images: usize,
     state: Mutex<State>,
 }
 
@@ -39,6 +41,8 @@ struct State {
     bar: Option<ProgressBar>,
     start: Instant,
     last: Option<(u32, Instant)>,
+    /// Images that are in their place.
+    finished: usize,
 }
 
 /// A line of `--progress json`.
@@ -55,7 +59,7 @@ enum Event<'a> {
 
 impl<'a> Progress<'a> {
     /// Progress of the kind that was asked for, on this program's own streams.
-    pub fn new(kind: ProgressKind, log: &'a Log) -> Self {
+    pub fn new(kind: ProgressKind, images: usize, log: &'a Log) -> Self {
         let kind = match kind {
             ProgressKind::Auto if !io::stderr().is_terminal() => Kind::Alf,
             ProgressKind::Auto | ProgressKind::Bar => Kind::Bar,
@@ -64,7 +68,7 @@ impl<'a> Progress<'a> {
             ProgressKind::Json => Kind::Json,
             ProgressKind::None => Kind::None,
         };
-        let progress = Self::on(kind, log, Box::new(io::stdout()));
+        let progress = Self::on(kind, images, log, Box::new(io::stdout()));
         if kind == Kind::Bar && log.shows(Level::Info) {
             let bar = bar();
             log.set_bar(Some(bar.clone()));
@@ -73,8 +77,9 @@ impl<'a> Progress<'a> {
         progress
     }
 
-    fn on(kind: Kind, log: &'a Log, machine: Box<dyn Write + Send>) -> Self {
-        Self { log, kind, state: Mutex::new(State { machine, bar: None, start: Instant::now(), last: None }) }
+    fn on(kind: Kind, images: usize, log: &'a Log, machine: Box<dyn Write + Send>) -> Self {
+        let state = State { machine, bar: None, start: Instant::now(), last: None, finished: 0 };
+        Self { log, kind, images, state: Mutex::new(state) }
     }
 
     /// A phase of the job begins.
@@ -92,9 +97,10 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// The share of the rendering that is done, in [0, 1].
+    /// The share of the rendering of the current image that is done, in [0, 1].
     pub fn advance(&self, done: f64) {
         let mut state = self.state();
+        let done = (state.finished as f64 + done) / self.images as f64;
         // Until the output is in its place, not all is done.
         if let Some(bar) = &state.bar {
             bar.set_position((done * BAR_LENGTH as f64).min(0.99 * BAR_LENGTH as f64) as u64);
@@ -115,22 +121,35 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// All is done and `image` is in its place.
+    /// `image` is in its place, and with the last one all is done.
     pub fn finish(&self, image: &Path, peak_memory: Option<u64>) {
-        self.close();
         let mut state = self.state();
-        self.show(&mut state, 100, Some(0.0));
+        state.finished += 1;
+        let last = state.finished >= self.images;
+        if last {
+            self.close(&mut state);
+            self.show(&mut state, 100, Some(0.0));
+        }
         let shown = image.to_string_lossy();
         match self.kind {
+            Kind::Alf => state.line(&format!("Image: {}", sanitise::one_line(&shown))),
+            Kind::Json => state.event(&Event::Image { path: &shown }),
+            Kind::Bar | Kind::OpenJd | Kind::None => {}
+        }
+        if last {
+            self.last_words(&mut state, peak_memory);
+        }
+    }
+
+    fn last_words(&self, state: &mut State, peak_memory: Option<u64>) {
+        match self.kind {
             Kind::Alf => {
-                state.line(&format!("Image: {}", sanitise::one_line(&shown)));
                 if let Some(bytes) = peak_memory {
                     state.line(&format!("Peak Memory Usage: {:.2} GB", bytes as f64 / 1e9));
                 }
                 state.line("Finished Rendering");
             }
             Kind::Json => {
-                state.event(&Event::Image { path: &shown });
                 let elapsed_seconds = state.start.elapsed().as_secs_f64();
                 state.event(&Event::Finished { elapsed_seconds, peak_memory_bytes: peak_memory });
             }
@@ -140,7 +159,7 @@ impl<'a> Progress<'a> {
 
     /// The job has failed.
     pub fn fail(&self, failure: &Failure) {
-        self.close();
+        self.close(&mut self.state());
         let message = failure.to_string();
         match self.kind {
             Kind::OpenJd => self.state().line(&format!("openjd_fail: {}", sanitise::one_line(&message))),
@@ -150,8 +169,8 @@ impl<'a> Progress<'a> {
     }
 
     /// Takes the bar away.
-    fn close(&self) {
-        if let Some(bar) = self.state().bar.take() {
+    fn close(&self, state: &mut State) {
+        if let Some(bar) = state.bar.take() {
             bar.finish_and_clear();
             self.log.set_bar(None);
         }
@@ -219,7 +238,7 @@ mod tests {
     fn shown(kind: Kind, job: impl FnOnce(&Progress<'_>)) -> Vec<String> {
         let (sender, lines) = mpsc::channel();
         let log = Log::new(Level::Error);
-        let progress = Progress::on(kind, &log, Box::new(Lines(sender)));
+        let progress = Progress::on(kind, 1, &log, Box::new(Lines(sender)));
         job(&progress);
         lines.try_iter().collect()
     }
@@ -277,7 +296,7 @@ mod tests {
     fn threads_may_report_at_once() {
         let log = Log::new(Level::Error);
         let (sender, lines) = mpsc::channel();
-        let progress = Arc::new(Progress::on(Kind::OpenJd, &log, Box::new(Lines(sender))));
+        let progress = Arc::new(Progress::on(Kind::OpenJd, 1, &log, Box::new(Lines(sender))));
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| (0..=100).for_each(|k| progress.advance(f64::from(k) / 100.0)));

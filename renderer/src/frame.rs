@@ -124,6 +124,12 @@ impl Samples {
     }
 }
 
+impl From<Range<u64>> for Samples {
+    fn from(range: Range<u64>) -> Self {
+        Self(if range.is_empty() { Vec::new() } else { vec![range] })
+    }
+}
+
 impl fmt::Display for Samples {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ranges: Vec<String> = self.0.iter().map(|range| format!("{}:{}", range.start, range.end)).collect();

@@ -19,6 +19,20 @@ use crate::output::OutputFile;
 
 /// Runs the command.
 pub fn run(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
+    let Some(frames) = &arguments.frames else { return merge(arguments, log) };
+    job::distinct(&arguments.output, frames.numbers())?;
+    for &frame in frames.numbers() {
+        let mut arguments = arguments.clone();
+        for path in arguments.parts.iter_mut().chain([&mut arguments.output]) {
+            *path = job::named(path, frame);
+        }
+        merge(&arguments, log)?;
+    }
+    Ok(())
+}
+
+/// Merges the parts of one frame.
+fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     let output = &arguments.output;
     let to_part = job::is_part(output);
     if !to_part {

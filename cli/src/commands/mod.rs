@@ -2,6 +2,7 @@
 
 mod compare;
 mod denoise;
+mod farm;
 mod info;
 mod merge;
 mod preview;
@@ -34,6 +35,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Command::Denoise(arguments) => denoise::run(arguments, &log),
         Command::Preview(arguments) => preview::run(arguments, &log),
         Command::Report(arguments) => report::run(arguments, &log),
+        Command::Farm(arguments) => farm::run(arguments, &log),
         Command::Study(arguments) => study::run(arguments, &log),
     });
     result.inspect_err(|failure| log.error(&failure.to_string()))

@@ -1,5 +1,6 @@
 //! `tessera render`: from a scene file to an image file.
 
+use std::iter;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
@@ -8,7 +9,7 @@ use renderer::error::{Estimate, Goal, Watch};
 use renderer::film::exr::{self, Losses};
 use renderer::film::{Aov, AovSet};
 use renderer::filtering::Filtering;
-use renderer::frame::Accumulation;
+use renderer::frame::{Accumulation, FrameDescription, Samples};
 use renderer::part::{self, Part};
 use renderer::render::{self, Frame, Job, Observer, Phase, RenderError};
 use renderer::scene::{Diagnostic, Severity};
@@ -29,20 +30,53 @@ const WARNINGS_SHOWN: u64 = 20;
 
 /// Runs the command.
 pub fn run(arguments: &RenderArguments, log: &Log) -> Result<(), Failure> {
-    let progress = Progress::new(arguments.run.progress, log);
-    render(arguments, log, &progress).inspect_err(|failure| progress.fail(failure))
+    let frames: Vec<_> = match &arguments.frames {
+        Some(frames) => frames.numbers().iter().copied().map(Some).collect(),
+        None => vec![arguments.frame],
+    };
+    let progress = Progress::new(arguments.run.progress, frames.len(), log);
+    sequence(arguments, &frames, log, &progress).inspect_err(|failure| progress.fail(failure))
 }
 
-fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Result<(), Failure> {
+/// Frames one after the other, each as if it were alone.
+fn sequence(
+    arguments: &RenderArguments,
+    frames: &[Option<i32>],
+    log: &Log,
+    progress: &Progress<'_>,
+) -> Result<(), Failure> {
+    if let Some(frames) = &arguments.frames {
+        let outputs = iter::once(&arguments.output).chain(&arguments.channels.stats);
+        outputs.into_iter().try_for_each(|output| job::distinct(output, frames.numbers()))?;
+    }
+    let interrupt = Interrupt::default();
+    if let Err(why) = interrupt.listen() {
+        log.warning(&format!("signals will end the render without an image: {why}"));
+    }
+    for &frame in frames {
+        if interrupt.requested() {
+            return Err(Failure::Interrupted("interrupted between two frames".into()));
+        }
+        let mut arguments = arguments.clone();
+        arguments.frame = frame;
+        arguments.scene = frame.map_or(arguments.scene.clone(), |frame| job::named(&arguments.scene, frame));
+        render(&arguments, log, progress, &interrupt)?;
+    }
+    Ok(())
+}
+
+fn render(
+    arguments: &RenderArguments,
+    log: &Log,
+    progress: &Progress<'_>,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let begin = Instant::now();
     job::check_samples(arguments)?;
     let filtering = job::filtering(&arguments.filter)?;
     let path = job::output(arguments)?;
     if job::is_part(&path) {
         part::storable(&filtering).map_err(|error| Failure::Usage(error.to_string()))?;
-    }
-    if arguments.checkpoint.skip_existing && is_complete(&path) {
-        log.info(&format!("{} is there and complete: nothing to do", path.display()));
-        return Ok(());
     }
     let encoding = job::encoding(&arguments.channels.encoding);
     let output = OutputFile::prepare(&path)?;
@@ -61,19 +95,21 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         log,
         progress,
         warnings: AtomicU64::new(0),
-        interrupt: Interrupt::default(),
+        interrupt,
         checkpoints,
         memory: MemoryLimit { bytes: arguments.run.memory_limit, reached: AtomicBool::new(false) },
         output: &output,
         watch,
         encoding: &encoding,
     };
-    if let Err(why) = reporter.interrupt.listen() {
-        log.warning(&format!("signals will end the render without an image: {why}"));
-    }
     let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
     let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
     job::check_encoding(&encoding, prepared.description.aovs)?;
+    if arguments.checkpoint.skip_existing && is_complete(&path, &prepared.description) {
+        log.info(&format!("{} is there and complete: nothing to do", path.display()));
+        progress.finish(&path, stats::peak_memory());
+        return Ok(());
+    }
     render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
     reporter.memory.check(render::least_memory(&prepared))?;
     let begun = reporter.checkpoints.begin(&prepared.description)?;
@@ -101,7 +137,7 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
         losses = exr::write_as(&frame.film, attributes, &encoding, output.target())
             .map_err(|error| Failure::Output(error.to_string()))?;
     }
-    let outcome = Outcome { path: &path, losses, error, write_seconds: start.elapsed().as_secs_f64() };
+    let outcome = Outcome { path: &path, losses, error, begin, write_seconds: start.elapsed().as_secs_f64() };
 
     let stats = outcome.stats(arguments, &frame, &reporter);
     if let Some(file) = stats_file {
@@ -125,12 +161,17 @@ fn render(arguments: &RenderArguments, log: &Log, progress: &Progress<'_>) -> Re
     judge(arguments, &stats)
 }
 
-/// Whether there is an image or a part that lacks no sample of those that were asked for.
-fn is_complete(path: &Path) -> bool {
+/// Whether there is an image or a part of this very frame that lacks no sample of those that are asked for.
+fn is_complete(path: &Path, description: &FrameDescription) -> bool {
+    let samples = Samples::from(description.asked.clone());
     if job::is_part(path) {
-        return Part::open(path).is_ok_and(|part| part.samples.missing(&part.description.asked).is_empty());
+        return Part::open(path)
+            .is_ok_and(|part| part.samples == samples && description.difference(&part.description).is_none());
     }
-    oiio::read(path).is_ok_and(|image| image.attribute("tessera/complete") == Some(&oiio::Attribute::Int(1)))
+    let same = |image: oiio::Image| {
+        metadata::identity(description, &samples).iter().all(|(name, value)| image.attribute(name) == Some(value))
+    };
+    oiio::read(path).is_ok_and(same)
 }
 
 fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
@@ -181,7 +222,7 @@ struct Reporter<'a> {
     log: &'a Log,
     progress: &'a Progress<'a>,
     warnings: AtomicU64,
-    interrupt: Interrupt,
+    interrupt: &'a Interrupt,
     checkpoints: Checkpoints<'a>,
     memory: MemoryLimit,
     output: &'a OutputFile,
@@ -324,6 +365,7 @@ struct Outcome<'a> {
     path: &'a Path,
     losses: Losses,
     error: Option<Estimate>,
+    begin: Instant,
     write_seconds: f64,
 }
 
@@ -350,7 +392,7 @@ impl<'a> Outcome<'a> {
                 compile: statistics.compile_seconds,
                 render: statistics.render_seconds,
                 write: self.write_seconds,
-                total: reporter.log.elapsed(),
+                total: self.begin.elapsed().as_secs_f64(),
             },
             rays: Rays {
                 camera: counters.camera_rays,

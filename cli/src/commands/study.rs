@@ -16,7 +16,7 @@ use crate::study::verdict::{self, Price};
 
 /// Runs the command.
 pub fn run(arguments: &StudyArguments, log: &Log) -> Result<(), Failure> {
-    let progress = Progress::new(arguments.progress, log);
+    let progress = Progress::new(arguments.progress, 1, log);
     study(arguments, log, &progress).inspect_err(|failure| progress.fail(failure))
 }
 

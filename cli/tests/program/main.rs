@@ -2,10 +2,12 @@
 
 mod compare;
 mod denoise;
+mod faults;
 mod info;
 mod merge;
 mod preview;
 mod render;
+mod sequence;
 mod study;
 mod usage;
 

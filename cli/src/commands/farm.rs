@@ -1,0 +1,226 @@
+//! `tessera farm`: a sequence as jobs for engines that others wrote.
+//!
+//! A job is frames × slices of samples, then a merge of each frame. Every task may be run again at any time: it goes on from
+//! its checkpoint, and what is done is skipped.
+
+mod openjd;
+mod slurm;
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use clap::Parser;
+
+use crate::args::{Arguments, Command, FarmArguments, FarmEngine, SequenceArguments};
+use crate::exit::Failure;
+use crate::job;
+use crate::log::Log;
+
+/// Between the request to stop and the end, so that a task can store what it has.
+const NOTICE_SECONDS: u32 = 90;
+
+/// Runs the command.
+pub fn run(arguments: &FarmArguments, log: &Log) -> Result<(), Failure> {
+    match &arguments.engine {
+        FarmEngine::Openjd(arguments) => super::print(&openjd::template(arguments)?),
+        FarmEngine::Slurm(arguments) => slurm::write(arguments, log),
+    }
+}
+
+/// A sequence to be rendered, checked.
+struct Sequence<'a> {
+    arguments: &'a SequenceArguments,
+    /// Of the job, and with which the names of parts begin.
+    name: String,
+    scene: Place<'a>,
+    output: Place<'a>,
+}
+
+/// Where a file is.
+struct Place<'a> {
+    folder: &'a str,
+    file: &'a str,
+}
+
+/// What the words of a task stand for, in the engine's notation.
+struct Task<'a> {
+    scene: &'a str,
+    parts: &'a str,
+    frames: &'a str,
+    slice: &'a str,
+    progress: &'a str,
+}
+
+impl<'a> Sequence<'a> {
+    /// # Errors
+    /// What no farm could render: frames without names of their own, options that a render would refuse.
+    fn new(arguments: &'a SequenceArguments) -> Result<Self, Failure> {
+        job::require_extension(&arguments.output, "exr", "the parts of a frame are merged to an OpenEXR image")?;
+        let (scene, output) = (Place::of(&arguments.scene)?, Place::of(&arguments.output)?);
+        job::distinct(&arguments.output, arguments.frames.numbers())?;
+        // A pattern of frame numbers is of no use in a job's name.
+        let stem = output.file.rsplit_once('.').map_or(output.file, |(stem, _)| stem);
+        let stem = stem.trim_end_matches(|c: char| c == '#' || c == '%' || c.is_ascii_digit() || c == 'd');
+        let stem = stem.trim_end_matches(['.', '_', '-']);
+        let name = arguments.name.as_deref().unwrap_or(if stem.is_empty() { "tessera" } else { stem });
+        // Both engines make file names of it.
+        let harmless = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
+        let name = name.trim_start_matches('-').chars().map(harmless).take(100).collect();
+        let sequence = Self { arguments, name, scene, output };
+        sequence.check_options()?;
+        Ok(sequence)
+    }
+
+    /// The words after the program's name that render one slice of frames.
+    fn render(&self, task: &Task<'_>) -> Vec<String> {
+        let part = self.part(task.parts, task.slice);
+        let slice = format!("{}/{}", task.slice, self.arguments.slices);
+        let checkpoint = format!("{part}.checkpoint");
+        [
+            "render",
+            task.scene,
+            "-o",
+            &part,
+            "--frames",
+            task.frames,
+            "--slice",
+            &slice,
+            "--checkpoint",
+            &checkpoint,
+            "--checkpoint-interval",
+            &self.arguments.checkpoint_interval,
+            "--resume",
+            "auto",
+            "--skip-existing",
+            "--progress",
+            task.progress,
+        ]
+        .map(str::to_owned)
+        .into()
+    }
+
+    /// The words after the program's name that merge frames.
+    fn merge(&self, parts: &str, frames: &str, output: &str) -> Vec<String> {
+        let mut words: Vec<_> = ["merge", "--frames", frames, "-o", output].map(str::to_owned).into();
+        words.extend((0..self.arguments.slices).map(|slice| self.part(parts, &slice.to_string())));
+        words
+    }
+
+    fn part(&self, parts: &str, slice: &str) -> String {
+        format!("{parts}/{}.####.s{slice}of{}.part", self.name, self.arguments.slices)
+    }
+
+    /// Makes sure before anything is handed out that a render takes the options.
+    fn check_options(&self) -> Result<(), Failure> {
+        let task = Task { scene: "scene.pbrt", parts: "parts", frames: "1", slice: "0", progress: "none" };
+        let words = self.render(&task);
+        let typed = ["tessera"].into_iter().chain(words.iter().chain(&self.arguments.options).map(String::as_str));
+        let parsed = Arguments::try_parse_from(typed).map_err(|why| {
+            let message = why.to_string();
+            let message = message.split("\n\nUsage:").next().unwrap_or_default();
+            let message = message.strip_prefix("error: ").unwrap_or(message);
+            Failure::Usage(format!("the options after -- cannot be given to every render: {}", message.trim_end()))
+        })?;
+        let Command::Render(render) = parsed.command else { unreachable!("the first word is \"render\"") };
+        job::filtering(&render.filter)?;
+        let refuse = |option, why| Err(Failure::Usage(format!("{option} cannot be given to slices: {why}")));
+        if render.quality.time_limit.is_some() {
+            return refuse("--time-limit", "a slice that stops early leaves a gap which no merge can fill");
+        }
+        if render.channels.stats.is_some() {
+            return refuse("--stats", "all slices of a frame would write the same file");
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Place<'a> {
+    /// # Errors
+    /// Engines pass on text in lines, so the path must be such.
+    fn of(path: &'a Path) -> Result<Self, Failure> {
+        let text = plain(path)?;
+        let name = path.file_name().and_then(OsStr::to_str);
+        let Some(file) = name else {
+            return Err(Failure::Usage(format!("\"{}\" has no file name", path.display())));
+        };
+        let folder = match path.parent().and_then(Path::to_str) {
+            None | Some("") => ".",
+            Some(folder) => folder,
+        };
+        debug_assert!(text.ends_with(file));
+        Ok(Self { folder, file })
+    }
+}
+
+/// The path as one line of text.
+///
+/// # Errors
+/// It is none.
+fn plain(path: &Path) -> Result<&str, Failure> {
+    path.to_str().filter(|text| !text.contains(char::is_control)).ok_or_else(|| {
+        Failure::Usage(format!("\"{}\" has characters that no job file can carry; rename it", path.display()))
+    })
+}
+
+/// A word that a shell reads as `text`.
+fn quoted(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "%+,-./:=@_".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return text.to_owned();
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `farm` does with a command line.
+    pub fn parsed(words: &[&str]) -> FarmArguments {
+        let typed = ["tessera", "farm"].iter().chain(words);
+        match Arguments::try_parse_from(typed).unwrap().command {
+            Command::Farm(arguments) => arguments,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn refusal(words: &[&str]) -> String {
+        let FarmEngine::Openjd(arguments) = parsed(words).engine else { panic!("not openjd") };
+        Sequence::new(&arguments.sequence).err().expect("a refusal").to_string()
+    }
+
+    #[test]
+    fn names_are_of_the_output_and_harmless() {
+        for (output, flags, name) in [
+            ("out/shot.####.exr", &[][..], "shot"),
+            ("out/shot_%04d.exr", &[], "shot"),
+            ("####.exr", &[], "tessera"),
+            ("a b'c.%d.exr", &[], "a_b_c"),
+            ("x.####.exr", &["--name=--über/\"shot\""], "über__shot_"),
+        ] {
+            let words = [&["openjd", "a.pbrt", "-o", output, "--frames", "1-2"], flags].concat();
+            let FarmEngine::Openjd(arguments) = parsed(&words).engine else { panic!("not openjd") };
+            assert_eq!(Sequence::new(&arguments.sequence).ok().unwrap().name, name, "{output}");
+        }
+    }
+
+    #[test]
+    fn what_no_farm_could_render_is_refused_before_it_is_handed_out() {
+        let base = ["openjd", "a.pbrt", "-o", "a.####.exr", "--frames", "1-2", "--"];
+        for (options, words) in [
+            (&["--sppp", "3"][..], &["--sppp"][..]),
+            (&["--spp", "0"], &["--spp"]),
+            (&["--slice", "0/2"], &["--slice", "multiple times"]),
+            (&["--filter-set", "cells=2"], &["--filter-set"]),
+            (&["--time-limit", "3m"], &["--time-limit", "gap"]),
+            (&["--stats", "a.json"], &["--stats"]),
+            (&["-o", "b.exr"], &["--output"]),
+        ] {
+            let refusal = refusal(&[&base, options].concat());
+            assert!(words.iter().all(|word| refusal.contains(word)), "{options:?}: {refusal}");
+        }
+        assert!(refusal(&["openjd", "a.pbrt", "-o", "a.exr", "--frames", "1-2"]).contains("####"));
+        assert!(refusal(&["openjd", "a.pbrt", "-o", "a.png", "--frames", "1"]).contains(".exr"));
+        assert!(refusal(&["openjd", "a\nb.pbrt", "-o", "a.exr", "--frames", "1"]).contains("rename"));
+    }
+}

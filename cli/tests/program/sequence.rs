@@ -1,0 +1,91 @@
+//! Several frames in one run, and as jobs for a farm.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+
+use super::{Bench, SCENE};
+
+/// Two scenes that are not alike.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("shot.0001.pbrt", SCENE);
+    bench.write("shot.0002.pbrt", &SCENE.replace("Translate 0 1 0", "Translate 1 1 0"));
+    bench
+}
+
+fn bytes(bench: &Bench, name: &str) -> Vec<u8> {
+    fs::read(bench.path(name)).unwrap()
+}
+
+#[test]
+fn frames_of_a_sequence_are_those_rendered_alone() {
+    let bench = bench();
+    let job = ["render", "--spp", "8", "--progress", "alf"];
+    let run = bench.succeed(&[&job[..], &["shot.####.pbrt", "-o", "all.####.exr", "--frames", "2,1..1"]].concat());
+    for (scene, frame) in [("shot.0001.pbrt", "1"), ("shot.0002.pbrt", "2")] {
+        bench.succeed(&[&job[..], &[scene, "-o", "alone.%d.exr", "--frame", frame]].concat());
+        let [all, alone] = [format!("all.000{frame}.exr"), format!("alone.{frame}.exr")];
+        assert!(bytes(&bench, &all) == bytes(&bench, &alone), "frame {frame}");
+    }
+    assert!(bytes(&bench, "all.0001.exr") != bytes(&bench, "all.0002.exr"));
+    let lines: Vec<_> = run.stdout.lines().filter(|line| !line.contains("Memory")).collect();
+    let last = ["Image: all.0002.exr", "ALF_PROGRESS 100%", "Image: all.0001.exr", "Finished Rendering"];
+    assert!(last.iter().all(|line| lines.iter().filter(|known| *known == line).count() == 1), "{lines:?}");
+    assert_eq!(lines.last(), Some(&"Finished Rendering"));
+}
+
+#[test]
+fn slices_of_a_sequence_merge_to_its_frames() {
+    let bench = bench();
+    let job = ["render", "shot.####.pbrt", "--spp", "32", "--frames", "1-2", "--progress", "none"];
+    bench.succeed(&[&job[..], &["-o", "whole.####.exr"]].concat());
+    bench.succeed(&[&job[..], &["-o", "%02d.a.part", "--slice", "0/2"]].concat());
+    bench.succeed(&[&job[..], &["-o", "%02d.b.part", "--slice", "1/2"]].concat());
+    bench.succeed(&["merge", "--frames", "2,1", "%02d.b.part", "%02d.a.part", "-o", "merged.####.exr"]);
+    for frame in ["0001", "0002"] {
+        assert!(
+            bytes(&bench, &format!("whole.{frame}.exr")) == bytes(&bench, &format!("merged.{frame}.exr")),
+            "{frame}"
+        );
+    }
+}
+
+#[test]
+fn frames_without_names_of_their_own_are_refused() {
+    let bench = bench();
+    let render = ["render", "shot.####.pbrt", "--frames", "1-2", "-o"];
+    bench.fail(&[&render[..], &["all.exr"]].concat(), 2, &["all.exr", "####"]);
+    bench.fail(&[&render[..], &["a.#.exr", "--stats", "stats.json"]].concat(), 2, &["stats.json", "####"]);
+    bench.fail(&[&render[..], &["a.#.exr", "--frame", "1"]].concat(), 2, &["--frame"]);
+    bench.fail(&["merge", "a.#.part", "-o", "a.exr", "--frames", "1-2"], 2, &["a.exr", "####"]);
+    bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr", "--frames", "1-"], 2, &["\"1-\"", "1-10x2"]);
+    // Without a number a name is a name.
+    bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr"], 3, &["shot.####.pbrt"]);
+}
+
+#[test]
+fn what_is_there_is_skipped_only_if_it_is_what_was_asked_for() {
+    let bench = bench();
+    for name in ["a.exr", "a.part"] {
+        let job = ["render", "shot.0001.pbrt", "-o", name, "--spp", "8", "--skip-existing", "--progress", "alf"];
+        bench.succeed(&job);
+        let first = bytes(&bench, name);
+        let run = bench.succeed(&job);
+        assert!(run.stderr.contains("nothing to do") && run.stdout.ends_with("Finished Rendering\n"), "{}", run.stderr);
+        let run = bench.succeed(&[&job[..], &["--seed", "5"]].concat());
+        assert!(!run.stderr.contains("nothing to do") && bytes(&bench, name) != first, "{name}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn job_files_are_for_the_engine() {
+    let bench = bench();
+    let shot = ["shot.####.pbrt", "-o", "out/shot.####.exr", "--frames", "1-2", "--slices", "2"];
+    let run = bench.succeed(&[&["farm", "openjd"], &shot[..], &["--", "--spp", "32"]].concat());
+    assert!(run.stdout.starts_with("specificationVersion: jobtemplate-2023-09\n"), "{}", run.stdout);
+    bench.succeed(&[&["farm", "slurm"], &shot[..], &["--folder", "a/job", "--", "--spp", "32"]].concat());
+    let mode = |name: &str| fs::metadata(bench.path(name)).unwrap().permissions().mode();
+    assert!(mode("a/job/submit") & 0o111 != 0 && mode("a/job/render.sbatch") & 0o111 == 0);
+    assert!(String::from_utf8(bytes(&bench, "a/job/merge.sbatch")).unwrap().contains("\nexec tessera merge "));
+    bench.fail(&[&["farm", "openjd"], &shot[..], &["--", "--sp", "32"]].concat(), 2, &["--sp"]);
+}
