@@ -12,11 +12,11 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::film::Film;
 use crate::frame::Accumulation;
-use crate::math::Rgb;
+use crate::math::{Rgb, luminance, windows};
 
 /// As in relMSE: the share of a channel's squared mean that keeps dark pixels finite.
 const RELATIVE_FLOOR: f64 = 0.01;
@@ -165,7 +165,7 @@ fn estimate(film: &Film, earlier: Option<&Earlier>) -> (Vec<Rgb>, Option<Estimat
     let certain = (mean - model).powi(2) / ((mean - model).powi(2) + error * error).max(f64::MIN_POSITIVE);
     let relmse = (model + certain * (mean - model)).max(0.25 * model);
     let level = if model > 0.0 { relmse / model } else { 1.0 };
-    let errors: Vec<Rgb> = windows(&local, width, RADIUS)
+    let errors: Vec<Rgb> = means(&local, width, RADIUS)
         .iter()
         .zip(&weights)
         .map(|(square, weight)| {
@@ -173,8 +173,8 @@ fn estimate(film: &Film, earlier: Option<&Earlier>) -> (Vec<Rgb>, Option<Estimat
             DVec3::new(root(0), root(1), root(2)).as_vec3()
         })
         .collect();
-    let total: f64 = pixels.iter().map(|p| luminance(p.value.as_vec3())).sum();
-    let noise = errors.iter().map(|error| luminance(*error)).sum::<f64>() / total.max(f64::MIN_POSITIVE);
+    let total: f64 = pixels.iter().map(|p| f64::from(luminance(p.value.as_vec3()))).sum();
+    let noise = errors.iter().map(|error| f64::from(luminance(*error))).sum::<f64>() / total.max(f64::MIN_POSITIVE);
     let half = NORMAL_95 * if filtered { error.max(0.1 * relmse) } else { error };
     (errors, Some(Estimate { relmse, interval: [(relmse - half).max(0.0), relmse + half], noise }))
 }
@@ -205,13 +205,8 @@ fn weights(pixels: &[Pixel], width: usize, filtered: bool) -> Vec<DVec3> {
     if filtered || values.len() < 2 {
         return values.iter().map(weight).collect();
     }
-    let height = values.len() / width;
-    let around = |(i, mean): (usize, &DVec3)| {
-        let near = |at: usize, size: usize| (at + 2).min(size) - at.saturating_sub(1);
-        let count = (near(i % width, width) * near(i / width, height)) as f64;
-        weight(&((*mean * count - values[i]) / (count - 1.0)))
-    };
-    windows(&values, width, 1).iter().enumerate().map(around).collect()
+    let around = windows(values.clone(), width, 1, |sum, count| (sum, count as f64 - 1.0));
+    around.iter().zip(&values).map(|((sum, others), value)| weight(&((*sum - *value) / *others))).collect()
 }
 
 /// Relative squared errors of a filtered frame: what tells pixels apart, and what is right in the mean.
@@ -256,20 +251,8 @@ fn mean_and_error(squares: &[DVec3], width: usize) -> (f64, f64) {
 }
 
 /// Means over windows, smaller at the borders.
-fn windows(values: &[DVec3], width: usize, radius: usize) -> Vec<DVec3> {
-    let height = values.len() / width.max(1);
-    let near = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
-    let mean = |range: std::ops::Range<usize>, value: &dyn Fn(usize) -> DVec3| {
-        let count = range.len() as f64;
-        range.map(value).sum::<DVec3>() / count
-    };
-    let rows: Vec<DVec3> =
-        (0..values.len()).map(|i| mean(near(i % width, width), &|x| values[i / width * width + x])).collect();
-    (0..values.len()).map(|i| mean(near(i / width, height), &|y| rows[y * width + i % width])).collect()
-}
-
-fn luminance(rgb: Vec3) -> f64 {
-    f64::from(rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
+fn means(values: &[DVec3], width: usize, radius: usize) -> Vec<DVec3> {
+    windows(values.to_vec(), width, radius, |sum, count| sum / count as f64)
 }
 
 #[cfg(test)]

@@ -63,6 +63,18 @@ pub fn describe(error: &RenderError) -> String {
     }
 }
 
+/// Adds the samples of `film` to `sum`, by way of what parts store.
+///
+/// # Panics
+/// If they are of different shapes.
+pub fn add(sum: &mut Film, film: &Film) {
+    let mut words = Vec::new();
+    film.store(0..film.slots(), &mut words);
+    let mut rest = words.as_slice();
+    sum.load(0..sum.slots(), &mut rest).expect("what was stored");
+    assert!(rest.is_empty(), "films of different shapes");
+}
+
 /// The pixels of a film, in 32 bits.
 pub fn pixels(film: &Film) -> RgbImage {
     let bounds = film.bounds();

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use renderer::film::AovSet;
 use renderer::render::{Frame, Job};
-use tests::render::{own_scene, run};
+use tests::render::{add, own_scene, run};
 use tests::shared;
 
 /// Every bit of the image.
@@ -66,7 +66,7 @@ fn a_sample_range_has_the_samples_of_the_whole() {
     let whole = run(&job(&scene, 2));
     for order in [[0..1, 1..4, 4..6], [4..6, 0..1, 1..4]] {
         let [mut sum, rest @ ..] = order.map(|range| run(&Job { sample_range: Some(range), ..job(&scene, 2) }));
-        rest.iter().for_each(|part| sum.film.merge(&part.film));
+        rest.iter().for_each(|part| add(&mut sum.film, &part.film));
         assert!(bits(&whole) == bits(&sum), "slices do not add up to the whole");
     }
 }

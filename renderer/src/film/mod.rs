@@ -240,18 +240,6 @@ impl Film {
         self.errors.get(self.index(at)).copied().unwrap_or(Rgb::ZERO)
     }
 
-    /// Adds the samples of another film.
-    ///
-    /// # Panics
-    /// If it is not of the same shape.
-    pub fn merge(&mut self, other: &Self) {
-        let shape = |film: &Self| (film.bounds, film.layers.clone(), film.named.clone());
-        assert!(shape(self) == shape(other), "films of different shapes");
-        self.pixels.iter_mut().zip(&other.pixels).for_each(|(pixel, other)| pixel.merge(other));
-        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, other)| sum.merge(other));
-        self.mattes.iter_mut().zip(&other.mattes).for_each(|(matte, other)| matte.merge(other));
-    }
-
     /// Bytes that a film of this shape is stored as, without names.
     pub fn stored_bytes(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
@@ -356,9 +344,6 @@ mod tests {
         let whole = words(&film(0..9));
         let mut sum = film(4..9);
         sum.load(0..sum.slots(), &mut &words(&film(0..4))[..]).unwrap();
-        assert!(words(&sum) == whole);
-        let mut sum = film(0..4);
-        sum.merge(&film(4..9));
         assert!(words(&sum) == whole);
         assert_eq!(film(0..1).load(0..sum.slots(), &mut &whole[1..]), None);
     }

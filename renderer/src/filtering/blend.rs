@@ -16,7 +16,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::film::{Film, Layer};
-use crate::math::Rgb;
+use crate::math::{Rgb, luminance, windows};
 
 /// A pixel with all that speaks for and against its filtered value, film RGB.
 #[derive(Clone, Copy, Debug, Default)]
@@ -142,42 +142,20 @@ impl Difference {
 fn weights(frame: &Frame, doubt: f32, radius: usize, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
     let width = frame.width;
     let differences: Vec<Difference> = (0..frame.pixels.len()).into_par_iter().map(&measure).collect();
-    let measured: Vec<[f32; 4]> = (0..differences.len())
+    let measured: Vec<Vec3> = (0..differences.len())
         .into_par_iter()
         .map(|i| {
             let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
             let [error, variance] = differences[i].errors(&differences[neighbour]);
-            [error, error * error, variance, 1.0]
+            Vec3::new(error, error * error, variance)
         })
         .collect();
     drop(differences);
-    let share = |[errors, squares, variances, n]: [f32; 4]| {
-        let (error, variance) = (errors / n, variances / n);
-        let standard_error = ((squares / n - error * error) / n).max(0.0).sqrt();
+    windows(measured, width, radius, |sums, count| {
+        let n = count as f32;
+        let [error, square, variance] = (sums / n).to_array();
+        let standard_error = ((square - error * error) / n).max(0.0).sqrt();
         let certain = error - doubt * standard_error;
         if certain > 0.0 { certain / (certain + variance) } else { 0.0 }
-    };
-    windows(measured, width, radius, share)
-}
-
-/// What `of` makes of sums over windows, smaller at the borders.
-fn windows<const N: usize>(
-    values: Vec<[f32; N]>,
-    width: usize,
-    radius: usize,
-    of: impl Fn([f32; N]) -> f32 + Sync,
-) -> Vec<f32> {
-    let height = values.len() / width.max(1);
-    let near = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
-    let sum = |a: [f32; N], b: &[f32; N]| std::array::from_fn(|i| a[i] + b[i]);
-    let all = (0..values.len()).into_par_iter();
-    let row = |i: usize| near(i % width, width).map(|x| &values[i / width * width + x]).fold([0.0; N], sum);
-    let rows: Vec<[f32; N]> = all.clone().map(row).collect();
-    drop(values);
-    let columns = |i: usize| near(i / width, height).map(move |y| y * width + i % width);
-    all.map(|i| of(columns(i).map(|at| &rows[at]).fold([0.0; N], sum))).collect()
-}
-
-fn luminance(rgb: Vec3) -> f32 {
-    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+    })
 }

@@ -6,9 +6,11 @@ pub mod ray;
 pub mod rgb;
 pub mod transform;
 pub mod warp;
+pub mod window;
 
 pub use frame::{Frame, LocalDir};
 pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero};
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;
+pub use window::windows;
