@@ -127,7 +127,7 @@ fn bias_vanishes() {
     if thorough() {
         scenes.push(("cavity", cavity(SIZE)));
         scenes.push(("coated", room(SIZE, 1.0, 1.0, GLOSSY)));
-        samples.push(256);
+        samples.extend([256, 1024]);
     }
     for (name, text) in scenes {
         let scene = SceneFile::new(&text);

@@ -1,22 +1,35 @@
 //! Filtered or not: decided by what the samples say of the filter's error, against the noise of the unfiltered image.
 //!
-//! Even and odd samples make two independent unfiltered images A and B. With F the filtered one, (F − A)(F − B) estimates
-//! the squared error of F without bias, whatever the sampler's stratification, and (A − B)²/4 that of their mean, the
-//! unfiltered image U. Over a window the first has a mean b and a standard error s. Only what is certain speaks against
-//! the filter: with b' = max(0, b − c s), the result is F + w (U − F), w = b' / (b' + V), which minimises the error of the sum
-//! of independent estimates. As samples grow V vanishes, and w goes to 1 wherever F is wrong.
+//! Even and odd samples make two independent unfiltered images A and B. With F the filtered one and U the mean of A and B,
+//! (F − A)(F − B) estimates the squared error of F without bias, whatever the sampler's stratification, and (A − B)²/4 that
+//! of U. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal, and less if its tails are
+//! heavier. This is sampling noise alone: where it vanishes so do all doubts, however few pixels of a neighbourhood the
+//! filter has wrong.
+//!
+//! Windows are nested, each thrice the side of the next. From the widest to the narrowest, a window's mean e and standard
+//! error s are weighed against what is believed of the window around it, B: the most probable b for a normal e and a
+//! density of b proportional to b exp(−b/B), whose own peak is B,
+//!
+//! b = (m + √(m² + 4s²)) / 2,  m = e − s²/B,
+//!
+//! or the lower confidence bound e − c s if that is more: at first nothing is believed, so only what is certain speaks
+//! against the filter. Where s is small b is e, where it is large b is B. The result is F + w (U − F), w = b / (b + V), which
+//! minimises the error of the sum of independent estimates. As samples grow V and s vanish, and w goes to 1 wherever F is
+//! wrong.
 //!
 //! With one sample a pixel there are no halves; then the neighbouring pixel stands for the other half.
 //!
 //! **Source**: the combiner of James and Stein \[James61\], \[Zheng22\] in its form for two halves, which is 1 − V/D with
-//! D = b + V; the standard error is ours, against the heavy tails of path tracing.
+//! D = b + V; the nested windows and their standard error are ours.
+
+use std::ops::Add;
 
 use filter::Resolved;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::film::{Film, Layer};
-use crate::math::{Rgb, luminance, windows};
+use crate::math::{Rgb, luminance, widened};
 
 /// A pixel with all that speaks for and against its filtered value, film RGB.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,21 +56,18 @@ pub struct Frame {
     pub pixels: Vec<Pixel>,
 }
 
-/// When the unfiltered image is believed. The defaults are measured, not derived.
+/// When the unfiltered image is believed. The default is measured, not derived.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
-    /// Half the side of the windows over which noise and difference are measured: of a window's pixels each gives one
-    /// degree of freedom to the variance.
-    pub radius: usize,
-    /// c for the glossy part.
-    pub glossy_doubt: f32,
-    /// c for the whole.
+    /// c: how many standard errors an error must exceed to be certain, whatever its surroundings. In the narrowest windows
+    /// it is doubled, for nine pixels of heavy-tailed noise do not know their own standard error, and doubled again where
+    /// those nine speak of the unfiltered image's noise as well.
     pub doubt: f32,
 }
 
 impl Default for Blend {
     fn default() -> Self {
-        Self { radius: 3, glossy_doubt: 1.0, doubt: 2.0 }
+        Self { doubt: 2.0 }
     }
 }
 
@@ -87,20 +97,22 @@ impl Frame {
     pub fn blend(&self, settings: &Blend) -> Vec<Rgb> {
         let sum: f64 = self.pixels.iter().map(|pixel| f64::from(luminance(pixel.own))).sum();
         let mean = (sum / self.pixels.len().max(1) as f64) as f32;
-        // Errors count relative to brightness, as eyes see them, down to a tenth of the mean.
-        let scale =
-            |pixel: &Pixel| luminance(pixel.base + pixel.glossy).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
-        let glossy = weights(self, settings.glossy_doubt, settings.radius, |i| {
+        // Errors count relative to brightness, as eyes see them, down to a tenth of the mean. The brightness is that of nine
+        // pixels: by its own, an error that brightens would excuse itself.
+        let bright = |pixel: &Pixel| Vec2::new(luminance(pixel.base + pixel.glossy), 1.0);
+        let bright = widened(&self.pixels.par_iter().map(bright).collect::<Vec<_>>(), self.width, 1);
+        let scale = |i: usize| (bright[i].x / bright[i].y).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
+        let glossy = weights(self, settings.doubt, |i| {
             let pixel = &self.pixels[i];
             let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
-            Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(pixel) }
+            Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(i) }
         });
         let filtered: Vec<Vec3> = (self.pixels.par_iter().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
-        let whole = weights(self, settings.doubt, settings.radius, |i| {
+        let whole = weights(self, settings.doubt, |i| {
             let pixel = &self.pixels[i];
-            Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scale(pixel) }
+            Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scale(i) }
         });
         let blended = (&self.pixels, &filtered, &whole)
             .into_par_iter()
@@ -116,46 +128,129 @@ struct Difference {
     /// Half the difference between the unfiltered values of even and odd samples; `None` without both.
     noise: Option<Vec3>,
     /// What differences are multiplied by before they are squared, so that bright pixels do not count for more than dark
-    /// ones, and so that squares fit: those of radiance itself need not.
+    /// ones.
     scale: f32,
 }
 
-impl Difference {
-    /// Unbiased estimates of the squared error of the filtered value and of that of the unfiltered one.
-    fn errors(&self, neighbour: &Self) -> [f32; 2] {
-        let difference = self.from_filtered * self.scale;
-        let square = difference.length_squared();
-        let beside = difference.dot(neighbour.from_filtered * neighbour.scale);
-        match self.noise {
-            // (F − A)(F − B) with A and B at U ± noise.
-            Some(noise) => {
-                let variance = (noise * self.scale).length_squared();
-                [0.5 * (square - variance + beside), variance]
-            }
-            // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
-            None => [beside, (square - beside).max(0.0)],
+/// Sums over a window of what its pixels say. Differences are relative to brightness.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evidence {
+    /// Squared error of the filtered value: an unbiased estimate, which may be negative.
+    error: f32,
+    /// Variance of that.
+    doubt: f32,
+    /// Squared error of the unfiltered value.
+    noise: f32,
+    /// Pixels.
+    count: f32,
+}
+
+impl Add for Evidence {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            error: self.error + other.error,
+            doubt: self.doubt + other.doubt,
+            noise: self.noise + other.noise,
+            count: self.count + other.count,
         }
     }
 }
 
+/// Relative differences beyond this count as this much, so that fourth powers, summed over the widest window, fit an `f32`.
+const LARGEST: f32 = 1e8;
+
+impl Difference {
+    /// What a pixel says, with the help of its neighbour if it has to.
+    fn evidence(&self, neighbour: &Self) -> Evidence {
+        let relative =
+            |difference: Vec3, scale: f32| (difference * scale).clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST));
+        let own = relative(self.from_filtered, self.scale);
+        // Mean and half the difference of F − A and F − B.
+        let (mean, half, pixels) = match self.noise {
+            Some(noise) => (own, relative(noise, self.scale), 1.0),
+            // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
+            None => {
+                let beside = relative(neighbour.from_filtered, neighbour.scale);
+                (0.5 * (own + beside), 0.5 * (own - beside), 2.0)
+            }
+        };
+        let (variance, both) = (half.length_squared(), mean.dot(half));
+        Evidence {
+            error: mean.length_squared() - variance,
+            doubt: 4.0 * both * both,
+            noise: pixels * variance,
+            count: 1.0,
+        }
+    }
+}
+
+impl Evidence {
+    /// Mean squared error of the filtered value, and the standard error of this mean.
+    fn error(&self) -> [f64; 2] {
+        let n = f64::from(self.count);
+        [f64::from(self.error) / n, f64::from(self.doubt).max(0.0).sqrt() / n]
+    }
+
+    /// Mean squared error of the unfiltered value.
+    fn noise(&self) -> f64 {
+        f64::from(self.noise / self.count)
+    }
+}
+
+/// Nested windows of 3, 9, 27 and 81 pixels a side.
+const LEVELS: usize = 4;
+
 /// The unfiltered value's share for each pixel.
-fn weights(frame: &Frame, doubt: f32, radius: usize, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
+fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
     let width = frame.width;
     let differences: Vec<Difference> = (0..frame.pixels.len()).into_par_iter().map(&measure).collect();
-    let measured: Vec<Vec3> = (0..differences.len())
-        .into_par_iter()
-        .map(|i| {
-            let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
-            let [error, variance] = differences[i].errors(&differences[neighbour]);
-            Vec3::new(error, error * error, variance)
-        })
-        .collect();
+    let evidence = |i: usize| {
+        let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
+        differences[i].evidence(&differences[neighbour])
+    };
+    let mut levels = vec![widened(&(0..differences.len()).into_par_iter().map(evidence).collect::<Vec<_>>(), width, 1)];
     drop(differences);
-    windows(measured, width, radius, |sums, count| {
-        let n = count as f32;
-        let [error, square, variance] = (sums / n).to_array();
-        let standard_error = ((square - error * error) / n).max(0.0).sqrt();
-        let certain = error - doubt * standard_error;
-        if certain > 0.0 { certain / (certain + variance) } else { 0.0 }
-    })
+    for level in 1..LEVELS {
+        levels.push(widened(&levels[level - 1], width, 3_usize.pow(level as u32)));
+    }
+    let doubt = f64::from(doubt);
+    let weight = |i: usize| {
+        let mut believed = 0.0;
+        for (level, windows) in levels.iter().enumerate().rev() {
+            let [error, standard_error] = windows[i].error();
+            let doubt = if level == 0 { 2.0 * doubt } else { doubt };
+            believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
+        }
+        // The noise of nine pixels may miss all that is bright: it is believed only beside an error beyond all doubt.
+        let [error, standard_error] = levels[0][i].error();
+        let certain = error - 4.0 * doubt * standard_error;
+        share(believed, levels[1][i].noise()).max(share(certain, levels[0][i].noise())) as f32
+    };
+    (0..frame.pixels.len()).into_par_iter().map(weight).collect()
 }
+
+/// What is believed of an error with an estimate, its standard error, and what is believed of the surroundings.
+fn most_probable(error: f64, standard_error: f64, around: f64) -> f64 {
+    if standard_error == 0.0 {
+        return error.max(0.0);
+    }
+    if around <= 0.0 {
+        return 0.0;
+    }
+    let square = standard_error * standard_error;
+    let m = error - square / around;
+    let root = (m * m + 4.0 * square).sqrt();
+    // Twice the same, the second without a difference of like numbers.
+    if m > 0.0 { 0.5 * (m + root) } else { 2.0 * square / (root - m) }
+}
+
+/// The share of a value of squared error `noise` beside an independent one of squared error `error`.
+fn share(error: f64, noise: f64) -> f64 {
+    if error > 0.0 { error / (error + noise) } else { 0.0 }
+}
+
+#[cfg(test)]
+#[path = "blend_tests.rs"]
+mod tests;

@@ -121,8 +121,6 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("tau", params.shrinkage.tau: f64, 0, 1000),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
     number!("levels", params.shrinkage.levels: u32, 0, 16),
-    number!("radius", blend.radius: usize, 0, 64),
-    number!("glossy_doubt", blend.glossy_doubt: f32, 0, 1000),
     number!("doubt", blend.doubt: f32, 0, 1000),
 ];
 
@@ -423,7 +421,7 @@ mod tests {
         let cases = [
             ("adaptive", "trees", "8", "9"),
             ("adaptive", "tau", "3.25", "-0.1"),
-            ("adaptive", "radius", "0", "1.5"),
+            ("adaptive", "levels", "0", "1.5"),
             ("adaptive", "leaf", "0.5", "0"),
             ("adaptive", "epoch", "auto", "0"),
             ("adaptive", "epoch", "12", "always"),

@@ -1,0 +1,127 @@
+use super::*;
+use crate::sampling::mix64;
+
+const SIDE: usize = 96;
+
+/// Independent normal numbers of mean 0 and variance 1, by pixel and use.
+fn noise(pixel: usize, of: u64) -> f32 {
+    let uniform = |of: u64| (mix64((pixel as u64) << 8 | of) >> 11) as f64 / (1u64 << 53) as f64;
+    // Box and Muller's.
+    let (radius, angle) = ((-2.0 * (1.0 - uniform(2 * of)).ln()).sqrt(), std::f64::consts::TAU * uniform(2 * of + 1));
+    (radius * angle.cos()) as f32
+}
+
+/// A white frame whose unfiltered halves have noise of standard deviation `sigma`, and whose filtered value is off by
+/// `bias` of the pixel.
+fn frame(sigma: f32, halves: bool, bias: impl Fn(usize, usize) -> f32) -> Frame {
+    let pixel = |i: usize| {
+        let [a, b] = [0, 1].map(|half| sigma * noise(i, half));
+        Pixel {
+            own: Vec3::splat(1.0 + 0.5 * (a + b)),
+            own_noise: halves.then(|| Vec3::splat(0.5 * (a - b))),
+            base: Vec3::splat(1.0 + bias(i % SIDE, i / SIDE)),
+            ..Pixel::default()
+        }
+    };
+    Frame { width: SIDE, pixels: (0..SIDE * SIDE).map(pixel).collect() }
+}
+
+/// Mean squared error of the blend over all pixels.
+fn error(frame: &Frame) -> f32 {
+    let values = frame.blend(&Blend::default());
+    values.iter().map(|value| (value.x - 1.0).powi(2)).sum::<f32>() / values.len() as f32
+}
+
+#[test]
+fn a_good_filter_is_left_alone() {
+    for sigma in [1e-3, 0.1, 1.0] {
+        for halves in [true, false] {
+            let gain = 0.5 * sigma * sigma / error(&frame(sigma, halves, |_, _| 0.0));
+            assert!(gain > 300.0, "{sigma} {halves}: {gain}");
+        }
+    }
+}
+
+#[test]
+fn a_bad_filter_is_dropped() {
+    for (sigma, bias) in [(1e-3, 0.1), (0.1, 1.0)] {
+        let gain = 0.5 * sigma * sigma / error(&frame(sigma, true, |_, _| bias));
+        assert!((0.98..1.02).contains(&gain), "{sigma}: {gain}");
+    }
+}
+
+#[test]
+fn an_error_of_one_pixel_is_found_once_the_noise_is_below_it() {
+    // A window's mean of one error among many scatters as much as it is large: only the noise tells it is no chance.
+    let lone = |x: usize, y: usize| if x % 32 == 16 && y % 32 == 16 { 0.5 } else { 0.0 };
+    let at = 16 * SIDE + 16;
+    let off = |sigma: f32| (frame(sigma, true, lone).blend(&Blend::default())[at].x - 1.0).abs();
+    assert!(off(1e-3) < 0.01 && off(1e-4) < 1e-3, "{} {}", off(1e-3), off(1e-4));
+}
+
+#[test]
+fn no_bias_makes_it_worse_than_no_filter() {
+    // Of all sizes beside the noise, 1, in patches of all sizes; worst near equality, where nothing can be certain.
+    let mut worst = f32::INFINITY;
+    for side in [1, 4, 16, 96] {
+        for bias in [0.1, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 10.0] {
+            let patches = |x: usize, y: usize| if (x / side + y / side) % 2 == 0 { bias } else { 0.0 };
+            let frame = frame(1.0, true, patches);
+            worst = worst.min(0.5 / error(&frame));
+        }
+    }
+    assert!(worst >= 0.98, "{worst}");
+}
+
+#[test]
+fn a_firefly_is_not_taken_for_the_filters_error() {
+    let mut frame = frame(0.1, true, |_, _| 0.0);
+    let at = 40 * SIDE + 40;
+    // In one half of the samples, as any single path is.
+    frame.pixels[at].own += 500.0;
+    *frame.pixels[at].own_noise.as_mut().unwrap() += 500.0;
+    let value = frame.blend(&Blend::default())[at].x;
+    assert!((value - 1.0).abs() < 0.05, "{value}");
+}
+
+#[test]
+fn the_doubt_is_the_variance_of_the_error() {
+    // Over many pixels of one bias and noise: a product of two normal-like numbers and its sample variance. Relative errors
+    // of both are below 6/√n for numbers whose fourth power has a standard deviation below six times its mean.
+    let n = 1 << 16;
+    for bias in [0.0, 0.5, 2.0] {
+        let evidence = |i: usize| {
+            let [a, b] = [0, 1].map(|half| noise(i, half));
+            let from_filtered = Vec3::splat(0.5 * (a + b) - bias);
+            Difference { from_filtered, noise: Some(Vec3::splat(0.5 * (a - b))), scale: 1.0 }
+        };
+        let all: Vec<Evidence> = (0..n).map(|i| evidence(i).evidence(&evidence(i))).collect();
+        let mean = |of: &dyn Fn(&Evidence) -> f64| all.iter().map(of).sum::<f64>() / n as f64;
+        let error = mean(&|e| e.error.into());
+        let variance = mean(&|e| (f64::from(e.error) - error).powi(2));
+        let doubt = mean(&|e| e.doubt.into());
+        let tolerance = 6.0 / f64::from(n as u32).sqrt();
+        assert!((doubt / variance - 1.0).abs() < tolerance, "{bias}: {doubt} {variance}");
+        let expected = 3.0 * f64::from(bias).powi(2);
+        assert!((error - expected).abs() < 3.0 * (variance / n as f64).sqrt(), "{bias}: {error} {expected}");
+    }
+}
+
+#[test]
+fn what_is_believed_lies_between_the_estimate_and_the_surroundings() {
+    assert!((most_probable(2.0, 1e-6, 0.5) - 2.0).abs() < 1e-6);
+    assert!((most_probable(2.0, 1e6, 0.5) - 0.5).abs() < 1e-6);
+    assert_eq!(most_probable(2.0, 0.0, 0.5), 2.0);
+    assert_eq!(most_probable(-2.0, 0.0, 0.5), 0.0);
+    assert_eq!(most_probable(2.0, 1.0, 0.0), 0.0);
+    for error in [-3.0, 0.0, 0.4, 0.5, 7.0] {
+        let mut last = 0.0;
+        for around in [1e-30, 1e-3, 0.1, 1.0, 1e3, 1e30] {
+            let found = most_probable(error, 0.7, around);
+            // The peak of the density there: neither side is more probable.
+            let density = |b: f64| b.ln() - b / around - 0.5 * ((b - error) / 0.7).powi(2);
+            assert!(found > last && density(found) >= density(found * 1.01) && density(found) >= density(found * 0.99));
+            last = found;
+        }
+    }
+}
