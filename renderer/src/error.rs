@@ -8,24 +8,19 @@
 //!   R − Rₘ over U − Uₘ. It is as noisy as the unfiltered image, so it is used for the frame as a whole;
 //! - (R − Rₘ)² m / (n − m) is R's variance and the change of its bias, with little noise: it tells pixels apart.
 //!
+//! What relMSE divides by is not known either, and an image is a poor stand-in for its own reference: `estimator` says what
+//! stands for it where.
+//!
 //! **Source**: the first is Stein's unbiased estimate \[Stein81\] with a measured divergence.
 
-use std::sync::{Mutex, PoisonError};
+mod estimator;
 
-use glam::DVec3;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use estimator::{Earlier, estimate};
 
 use crate::film::Film;
 use crate::frame::Accumulation;
-use crate::math::{Rgb, luminance, windows};
-
-/// As in relMSE: the share of a channel's squared mean that keeps dark pixels finite.
-const RELATIVE_FLOOR: f64 = 0.01;
-/// Half the side of the windows over which errors are pooled: 49 degrees of freedom know a standard error to 10 %.
-const RADIUS: usize = 3;
-/// Side of the blocks whose scatter gives the frame's interval: cells of the filter are smaller.
-const BLOCK: usize = 16;
-/// Half the width of a 95 % interval, in standard errors.
-const NORMAL_95: f64 = 1.959_964;
 
 /// The error of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,14 +56,7 @@ impl Goal {
     }
 }
 
-/// A frame as it was.
-#[derive(Clone)]
-struct Earlier {
-    samples: f64,
-    values: Vec<DVec3>,
-    own: Vec<DVec3>,
-}
-
+/// What the looks have left.
 #[derive(Default)]
 struct State {
     /// The last two looks, the later one last.
@@ -92,17 +80,27 @@ impl Watch {
 
     /// To be told of each pass.
     pub fn pass_done(&self, frame: &mut Accumulation) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let samples = frame.samples.count();
-        if samples < state.next || (samples == frame.description.spp && self.goal == Goal::default()) {
+        if samples < self.next_look() || (samples == frame.description.spp && self.goal == Goal::default()) {
             return;
         }
-        state.next = 2 * samples;
         if frame.filter.is_some() {
             frame.develop();
         }
+        self.look(&frame.film, samples);
+    }
+
+    /// Number of samples per pixel at which to look next.
+    pub fn next_look(&self) -> u64 {
+        self.state().next
+    }
+
+    /// Looks at a film of so many samples per pixel, filtered if it is to be; whether the goal is reached.
+    pub fn look(&self, film: &Film, samples: u64) -> bool {
+        let mut state = self.state();
+        state.next = 2 * samples;
         if self.goal != Goal::default() {
-            let (_, estimate) = estimate(&frame.film, state.best(samples));
+            let (_, estimate) = estimate(film, state.best(samples));
             if let Some(estimate) = estimate {
                 state.reached |= self.goal.reached(&estimate);
                 // At least a tenth more, so that looking stays cheap.
@@ -111,28 +109,30 @@ impl Watch {
             }
         }
         let last = state.earlier[1].as_ref().map_or(0.0, |earlier| earlier.samples);
-        if frame.filter.is_some() && samples as f64 >= 2.0 * last {
-            let (film, at) = (&frame.film, || frame.film.bounds().pixels());
-            let values = at().map(|at| film.value(at)).collect();
-            let own = at().map(|at| film.pixel(at).mean()).collect();
+        if film.filtered() && samples as f64 >= 2.0 * last {
             state.earlier.swap(0, 1);
-            state.earlier[1] = Some(Earlier { samples: samples as f64, values, own });
+            state.earlier[1] = Some(Earlier::new(film, samples));
         }
+        state.reached
     }
 
     /// Whether the goal is reached.
     pub fn reached(&self) -> bool {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).reached
+        self.state().reached
     }
 
-    /// Gives the finished film its errors; `None` with too few samples to tell: without even and odd ones, or filtered in
-    /// fewer than two blocks.
+    /// Gives the finished film its errors; `None` with too few samples to tell: without even and odd ones, or filtered and
+    /// never looked at before.
     pub fn finish(&self, film: &mut Film) -> Option<Estimate> {
-        let state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = self.state();
         let samples = film.bounds().pixels().next().map_or(0, |at| film.pixel(at).count());
         let (errors, estimate) = estimate(film, state.best(samples));
         film.set_errors(&errors);
         estimate
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -143,122 +143,11 @@ impl State {
     }
 }
 
-/// Standard error of each pixel, film RGB, and that of the frame.
-fn estimate(film: &Film, earlier: Option<&Earlier>) -> (Vec<Rgb>, Option<Estimate>) {
-    let (width, filtered) = (film.bounds().width() as usize, film.filtered());
-    let unknown = || (vec![Rgb::ZERO; film.bounds().area() as usize], None);
-    let Some(pixels) = film.bounds().pixels().map(|at| Pixel::new(film, at)).collect::<Option<Vec<_>>>() else {
-        return unknown();
-    };
-    let weights = weights(&pixels, width, filtered);
-    let (local, whole) = match (filtered, earlier) {
-        (false, _) => {
-            let squares: Vec<DVec3> = pixels.iter().zip(&weights).map(|(p, w)| p.noise * p.noise * *w).collect();
-            (squares.clone(), squares)
-        }
-        (true, None) => return unknown(),
-        (true, Some(earlier)) => of_filtered(&pixels, &weights, earlier),
-    };
-    let (mean, error) = mean_and_error(&whole, width);
-    // The level is that of the unbiased estimate as far as that is certain, else that of the other.
-    let model = mean_and_error(&local, width).0;
-    let certain = (mean - model).powi(2) / ((mean - model).powi(2) + error * error).max(f64::MIN_POSITIVE);
-    let relmse = (model + certain * (mean - model)).max(0.25 * model);
-    let level = if model > 0.0 { relmse / model } else { 1.0 };
-    let errors: Vec<Rgb> = means(&local, width, RADIUS)
-        .iter()
-        .zip(&weights)
-        .map(|(square, weight)| {
-            let root = |c: usize| if weight[c] > 0.0 { (level * square[c] / weight[c]).sqrt() } else { 0.0 };
-            DVec3::new(root(0), root(1), root(2)).as_vec3()
-        })
-        .collect();
-    let total: f64 = pixels.iter().map(|p| f64::from(luminance(p.value.as_vec3()))).sum();
-    let noise = errors.iter().map(|error| f64::from(luminance(*error))).sum::<f64>() / total.max(f64::MIN_POSITIVE);
-    let half = NORMAL_95 * if filtered { error.max(0.1 * relmse) } else { error };
-    (errors, Some(Estimate { relmse, interval: [(relmse - half).max(0.0), relmse + half], noise }))
-}
-
-/// A pixel of a frame.
-struct Pixel {
-    value: DVec3,
-    own: DVec3,
-    /// Half the difference of even and odd samples.
-    noise: DVec3,
-}
-
-impl Pixel {
-    fn new(film: &Film, at: [u32; 2]) -> Option<Self> {
-        let [even, odd] = film.pixel(at).halves()?;
-        Some(Self { value: film.value(at), own: 0.5 * (even + odd), noise: 0.5 * (even - odd) })
-    }
-}
-
-/// What squares are multiplied by. The reference of relMSE is not known: a filtered pixel stands for it, and for an unfiltered
-/// one the mean of those around it. Its own value must not: weights would be small where its error is large.
-fn weights(pixels: &[Pixel], width: usize, filtered: bool) -> Vec<DVec3> {
-    let values: Vec<DVec3> = pixels.iter().map(|pixel| pixel.value).collect();
-    let mean = values.iter().sum::<DVec3>() / values.len().max(1) as f64;
-    let floor = RELATIVE_FLOOR * mean * mean;
-    let reciprocal = |x: f64| if x > 0.0 { x.recip() } else { 0.0 };
-    let weight = |value: &DVec3| (value * value + floor).to_array().map(reciprocal).into();
-    if filtered || values.len() < 2 {
-        return values.iter().map(weight).collect();
-    }
-    let around = windows(values.clone(), width, 1, |sum, count| (sum, count as f64 - 1.0));
-    around.iter().zip(&values).map(|((sum, others), value)| weight(&((*sum - *value) / *others))).collect()
-}
-
-/// Relative squared errors of a filtered frame: what tells pixels apart, and what is right in the mean.
-fn of_filtered(pixels: &[Pixel], weights: &[DVec3], earlier: &Earlier) -> (Vec<DVec3>, Vec<DVec3>) {
-    let changes = |at: usize| (pixels[at].value - earlier.values[at], pixels[at].own - earlier.own[at]);
-    // How much more the unfiltered image has changed than its error is.
-    let (mut noise, mut change) = (DVec3::ZERO, DVec3::ZERO);
-    for (at, weight) in weights.iter().enumerate() {
-        noise += pixels[at].noise * pixels[at].noise * *weight;
-        change += changes(at).1 * changes(at).1 * *weight;
-    }
-    let ratio = noise / change.max(DVec3::splat(f64::MIN_POSITIVE));
-    // Of m samples and of n: the change has variance σ²(1/m − 1/n), the frame σ²/n.
-    let share = noise.element_sum() / change.element_sum().max(f64::MIN_POSITIVE);
-    let local = (0..pixels.len()).map(|at| share * changes(at).0 * changes(at).0 * weights[at]).collect();
-    let whole = |at: usize| {
-        let (Pixel { value, own, noise }, (filtered, plain)) = (&pixels[at], changes(at));
-        let product = (value - own - noise) * (value - own + noise);
-        (product + 2.0 * ratio * filtered * plain) * weights[at]
-    };
-    (local, (0..pixels.len()).map(whole).collect())
-}
-
-/// Mean over pixels and channels, and its standard error: from neighbouring blocks, which differ little but by noise.
-fn mean_and_error(squares: &[DVec3], width: usize) -> (f64, f64) {
-    let height = squares.len() / width.max(1);
-    let mut blocks = Vec::new();
-    for y in (0..height).step_by(BLOCK) {
-        for x in (0..width).step_by(BLOCK) {
-            let rows = y..height.min(y + BLOCK);
-            let sum: f64 = rows
-                .flat_map(|y| &squares[y * width + x..y * width + width.min(x + BLOCK)])
-                .map(|square| square.element_sum())
-                .sum();
-            blocks.push(sum);
-        }
-    }
-    let count = 3.0 * squares.len().max(1) as f64;
-    let pairs = blocks.windows(2).map(|pair| 0.5 * (pair[0] - pair[1]).powi(2)).sum::<f64>();
-    let variance = pairs * blocks.len() as f64 / (blocks.len() as f64 - 1.0).max(1.0);
-    (blocks.iter().sum::<f64>() / count, variance.sqrt() / count)
-}
-
-/// Means over windows, smaller at the borders.
-fn means(values: &[DVec3], width: usize, radius: usize) -> Vec<DVec3> {
-    windows(values.to_vec(), width, radius, |sum, count| sum / count as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::{AovSet, Taken};
+    use crate::math::Rgb;
     use crate::integrator::FirstHit;
     use crate::world::Bounds;
 

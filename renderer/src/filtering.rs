@@ -142,6 +142,11 @@ impl FrameFilter {
         self.blocks.first(rest)
     }
 
+    /// Whether the film can be developed with only some samples of a block.
+    pub fn divisible(&self) -> bool {
+        matches!(self.sharing, Sharing::Adaptive(..))
+    }
+
     /// Adds the paths of a block, by tile.
     pub fn add(&mut self, block: &Range<u64>, records: &[Vec<PathRecord>]) {
         match &mut self.sharing {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use filter::PathRecord;
 use glam::DMat4;
 
 use crate::film::{self, AovSet, Film, Outputs};
@@ -180,6 +181,31 @@ impl Accumulation {
     /// Gives the film its filtered values, as of now. Nothing is lost: more samples may follow.
     pub fn develop(&mut self) -> Option<filtering::Report> {
         self.filter.as_mut().map(|filter| filter.develop(&self.description.surroundings, &mut self.film))
+    }
+
+    /// The same as if the block whose first samples left `records` had ended with them; the filter has not taken them, and
+    /// will not have. A copy of it does, so this is for frames of few samples yet.
+    ///
+    /// # Panics
+    /// If the filter cannot be stored: see [`FrameFilter::divisible`].
+    pub fn develop_with(&mut self, samples: &Range<u64>, records: &[Vec<PathRecord>]) {
+        let Some(filter) = &mut self.filter else { return };
+        let Self { description, film, .. } = self;
+        let mut copy = FrameFilter::new(&description.filtering, &description.surroundings, film)
+            .ok()
+            .flatten()
+            .expect("the settings of a frame's filter are valid");
+        let mut words = Vec::new();
+        for tile in 0..film.tile_count() {
+            words.clear();
+            filter.store(tile, &mut words);
+            copy.load(tile, Film::tile_slots(tile), &words).expect("a filter takes its own sums");
+        }
+        words.clear();
+        filter.store_epoch(samples.start, &mut words);
+        copy.load_epoch(samples.start, &words).expect("a filter takes its own sums");
+        copy.add(samples, records);
+        copy.finish(&description.surroundings, film);
     }
 
     /// The same when no more samples follow: takes less memory.

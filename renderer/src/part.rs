@@ -20,7 +20,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3, Mat3};
 use serde::{Deserialize, Serialize};
 
-use crate::film::{AovSet, Film, TILE, exr};
+use crate::film::{AovSet, Film, exr};
 use crate::filtering::{Filtering, Surroundings};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::Counters;
@@ -262,7 +262,7 @@ fn write_sections(frame: &mut Accumulation, writer: &mut impl Write) -> io::Resu
         write_section(writer, &section)
     };
     for tile in 0..frame.film.tile_count() {
-        frame.film.store(tile_pixels(tile), &mut words);
+        frame.film.store(Film::tile_slots(tile), &mut words);
         if let Some(filter) = &mut frame.filter {
             filter.store(tile, &mut words);
         }
@@ -281,12 +281,6 @@ fn texts(names: &[Arc<str>]) -> Vec<String> {
 
 fn shared(names: &[String]) -> Vec<Arc<str>> {
     names.iter().map(|name| name.as_str().into()).collect()
-}
-
-/// The pixels of a tile, by their indices.
-fn tile_pixels(tile: usize) -> std::ops::Range<usize> {
-    let pixels = (TILE * TILE) as usize;
-    tile * pixels..(tile + 1) * pixels
 }
 
 fn write_section(writer: &mut impl Write, bytes: &[u8]) -> io::Result<u64> {
@@ -394,9 +388,9 @@ impl Part {
         for tile in 0..frame.film.tile_count() {
             let words = read()?;
             let mut cells = words.as_slice();
-            frame.film.load(tile_pixels(tile), &mut cells).ok_or_else(damaged)?;
+            frame.film.load(Film::tile_slots(tile), &mut cells).ok_or_else(damaged)?;
             match &mut frame.filter {
-                Some(filter) => filter.load(tile, tile_pixels(tile), cells).map_err(|_| damaged())?,
+                Some(filter) => filter.load(tile, Film::tile_slots(tile), cells).map_err(|_| damaged())?,
                 None if cells.is_empty() => {}
                 None => return Err(damaged()),
             }

@@ -7,14 +7,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use filter::Anchor;
+use filter::{Anchor, PathRecord};
 use rayon::prelude::*;
 
 use crate::compile::names::Names;
 use crate::compile::{self, CompileError};
 use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
-use crate::filtering::{self, Filtering, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching};
+use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
@@ -105,6 +105,14 @@ pub trait Observer: Sync {
     fn pass_done(&self, _frame: &mut Accumulation) {}
     /// Whether to stop: at the end of the pass.
     fn stop_requested(&self) -> bool {
+        false
+    }
+    /// Number of samples per pixel at which [`Self::look`] is to be called, even if a pass does not end there.
+    fn next_look(&self) -> u64 {
+        u64::MAX
+    }
+    /// Every pixel has so many samples, and the film is filtered if it is to be: whether the frame ends here.
+    fn look(&self, _film: &Film, _samples: u64) -> bool {
         false
     }
 }
@@ -458,19 +466,7 @@ fn trace_passes<Q: Queries + Sync>(
     let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), ids, progress };
     while !rest.is_empty() && (frame.samples.count() == 0 || !over()) {
         let pass = frame.pass(&rest);
-        rest.start = pass.end;
-        frame.counters += match &mut frame.filter {
-            None => passes.watch(&pass, &mut frame.film, || Nothing).0,
-            Some(filter) => {
-                let selection = filter.selection();
-                let (counters, paths) = passes.watch(&pass, &mut frame.film, || Paths::new(selection));
-                let start = Instant::now();
-                filter.add(&pass, &paths.into_iter().map(|paths| paths.records).collect::<Vec<_>>());
-                statistics.filter_seconds += start.elapsed().as_secs_f64();
-                counters
-            }
-        };
-        frame.samples.insert(pass).expect("passes do not overlap");
+        rest.start = passes.trace_pass(&pass, frame, statistics, observer);
         statistics.passes += 1;
         observer.pass_done(frame);
     }
@@ -487,6 +483,55 @@ struct Passes<'a, Q> {
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
+    /// Traces a pass, or as much of it as the observer wants; the first sample that was not traced.
+    fn trace_pass(
+        &self,
+        pass: &Range<u64>,
+        frame: &mut Accumulation,
+        statistics: &mut Statistics,
+        observer: &dyn Observer,
+    ) -> u64 {
+        let (mut next, mut records) = (pass.start, Vec::new());
+        loop {
+            let done = frame.samples.count();
+            let divisible = frame.filter.as_ref().is_none_or(FrameFilter::divisible);
+            let end = if divisible { first_look(&(next..pass.end), done, observer.next_look()) } else { pass.end };
+            let counters = self.add(&(next..end), frame, &mut records);
+            frame.counters += counters;
+            frame.samples.insert(next..end).expect("passes do not overlap");
+            next = end;
+            if next == pass.end {
+                break;
+            }
+            frame.develop_with(&(pass.start..next), &records);
+            if observer.look(&frame.film, frame.samples.count()) {
+                break;
+            }
+        }
+        if let Some(filter) = &mut frame.filter {
+            let start = Instant::now();
+            filter.add(&(pass.start..next), &records);
+            statistics.filter_seconds += start.elapsed().as_secs_f64();
+        }
+        next
+    }
+
+    /// Adds samples of every pixel to the film, and what a filter is to have of them to `records`, by tile.
+    fn add(&self, samples: &Range<u64>, frame: &mut Accumulation, records: &mut Vec<Vec<PathRecord>>) -> Counters {
+        let Some(filter) = &frame.filter else { return self.watch(samples, &mut frame.film, || Nothing).0 };
+        let selection = filter.selection();
+        let (counters, paths) = self.watch(samples, &mut frame.film, || Paths::new(selection));
+        records.resize_with(paths.len(), Vec::new);
+        for (records, paths) in records.iter_mut().zip(paths) {
+            if records.is_empty() {
+                *records = paths.records;
+            } else {
+                records.extend(paths.records);
+            }
+        }
+        counters
+    }
+
     /// Traces samples `pass` of every pixel, looking aside if the film wants it; what was kept of them, by tile.
     fn watch<K: Keeper>(
         &self,
@@ -528,6 +573,15 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
         let kept = kept.collect();
         (sum, kept)
     }
+}
+
+/// Where to end the next piece of `rest` when `done` samples are done and somebody wants to look at `look`.
+///
+/// Not at all if what is left then is less than an eighth of the samples: it changes little, and to look in mid-pass costs
+/// a copy of the filter.
+fn first_look(rest: &Range<u64>, done: u64, look: u64) -> u64 {
+    let end = rest.start.saturating_add(look.saturating_sub(done).max(1));
+    if end < rest.end && (rest.end - end).saturating_mul(8) > look { end } else { rest.end }
 }
 
 /// Radiance of the order of the frame's mean, from a few paths all over it: the same for every part of the frame's
@@ -669,6 +723,18 @@ mod tests {
             }
         }
         assert!(Slice { index: 2, count: 2 }.samples(16, 4).is_err());
+    }
+
+    #[test]
+    fn looks_divide_passes_while_samples_are_few() {
+        // As asked; at least a sample; the whole pass; no eighth of the samples left.
+        assert_eq!(first_look(&(0..16), 0, 2), 2);
+        assert_eq!(first_look(&(2..16), 2, 1), 3);
+        assert_eq!(first_look(&(4..8), 4, u64::MAX), 8);
+        assert_eq!(first_look(&(96..112), 96, 105), 112);
+        assert_eq!(first_look(&(96..128), 96, 105), 105);
+        // Of a slice that begins at sample 32.
+        assert_eq!(first_look(&(34..48), 2, 4), 36);
     }
 
     #[test]

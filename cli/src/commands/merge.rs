@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use renderer::error::{Goal, Watch};
-use renderer::film::exr;
+use renderer::film::{Aov, exr};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, Samples};
 use renderer::part::{self, Part, PartError};
@@ -56,6 +56,7 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     }
     let count = parts.len();
     let mut frame: Option<Accumulation> = None;
+    let watch = watch(&parts);
     for part in parts {
         log.verbose(&format!("adding {}: samples {}", part.path.display(), part.samples));
         let frame = frame.get_or_insert_with(|| {
@@ -64,6 +65,9 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
             Accumulation::new(description)
         });
         part.add_to(frame).map_err(refused)?;
+        if let Some(watch) = watch.as_ref().filter(|_| !to_part) {
+            pool.install(|| watch.pass_done(frame));
+        }
     }
     let mut frame = frame.ok_or_else(|| Failure::Usage("there are no parts to merge".into()))?;
     if to_part {
@@ -73,9 +77,7 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     }
     let statistics = Statistics { counters: frame.counters, ..Statistics::default() };
     let mut frame = pool.install(|| Traced { frame, statistics }.develop());
-    // Without a filter the sums tell the error as they do in a render of the whole.
-    let plain = frame.description.filtering == Filtering::None;
-    let error = plain.then(|| Watch::new(Goal::default()).finish(&mut frame.film)).flatten();
+    let error = watch.and_then(|watch| watch.finish(&mut frame.film));
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }
@@ -84,6 +86,14 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
         .map_err(|error| Failure::Output(error.to_string()))?;
     tell(log, output, count, &frame.samples, start);
     Ok(())
+}
+
+/// Who looks at the frame's error. Without a filter the sums tell it as they do in a render of the whole; with one the frame
+/// is compared with what it was after some of the parts, if somebody asks.
+fn watch(parts: &[Part]) -> Option<Watch> {
+    let description = &parts.first()?.description;
+    let asked = description.filtering == Filtering::None || description.aovs.contains(Aov::Error);
+    asked.then(|| Watch::new(Goal::default()))
 }
 
 /// Makes sure that all parts are of one frame and share no sample, before any of them is read; the first samples that none

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use renderer::error::{Estimate, Goal, Watch};
 use renderer::film::exr::{self, Losses};
-use renderer::film::{Aov, AovSet};
+use renderer::film::{Aov, AovSet, Film};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Samples};
 use renderer::part::{self, Part};
@@ -306,6 +306,14 @@ impl Observer for Reporter<'_> {
 
     fn stop_requested(&self) -> bool {
         self.hindered() || self.watch.as_ref().is_some_and(Watch::reached)
+    }
+
+    fn next_look(&self) -> u64 {
+        self.watch.as_ref().map_or(u64::MAX, Watch::next_look)
+    }
+
+    fn look(&self, film: &Film, samples: u64) -> bool {
+        self.watch.as_ref().is_some_and(|watch| watch.look(film, samples))
     }
 }
 

@@ -158,6 +158,12 @@ impl Film {
         self.tiles[0] as usize * self.tiles[1] as usize
     }
 
+    /// Indices of a tile's pixels.
+    pub fn tile_slots(tile: usize) -> Range<usize> {
+        let pixels = (TILE * TILE) as usize;
+        tile * pixels..(tile + 1) * pixels
+    }
+
     /// All tiles, each independently mutable.
     pub fn tiles(&mut self) -> Vec<Tile<'_>> {
         let (bounds, across, layers) = (self.bounds, self.tiles[0], self.layers.as_slice());
