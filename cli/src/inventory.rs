@@ -13,6 +13,9 @@ use serde::Serialize;
 /// Counts by name, sorted by name.
 pub type Counts = BTreeMap<&'static str, u64>;
 
+/// The feature of a camera with a lens.
+pub const LENS: &str = "depth of field";
+
 /// What a scene contains.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inventory {
@@ -193,7 +196,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         ("portals", scene.lights.iter().any(|light| portals(&light.kind))),
         ("textured area lights", scene.area_lights.iter().any(|light| light.image.is_some())),
         ("participating media", !scene.media.is_empty()),
-        ("depth of field", scene.camera.lens_radius > 0.0),
+        (LENS, scene.camera.lens_radius > 0.0),
         ("crop", window),
         ("auxiliary channels", scene.film.gbuffer),
         ("clamping", scene.film.max_component_value.is_finite()),

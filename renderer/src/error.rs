@@ -147,8 +147,8 @@ impl State {
 mod tests {
     use super::*;
     use crate::film::{AovSet, Taken};
-    use crate::math::Rgb;
     use crate::integrator::FirstHit;
+    use crate::math::Rgb;
     use crate::world::Bounds;
 
     /// A film of 64 x 64 pixels with `spp` samples of mean `level` and variance 1, uniform.

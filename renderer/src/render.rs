@@ -14,7 +14,9 @@ use crate::compile::names::Names;
 use crate::compile::{self, CompileError};
 use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
-use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching};
+use crate::filtering::{
+    self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching,
+};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
@@ -469,6 +471,9 @@ fn trace_passes<Q: Queries + Sync>(
         rest.start = passes.trace_pass(&pass, frame, statistics, observer);
         statistics.passes += 1;
         observer.pass_done(frame);
+        if rest.start < pass.end {
+            break;
+        }
     }
 }
 

@@ -1,9 +1,12 @@
 //! Whole frames with the adaptive filter, where the answer is exact: invariances, edge cases, sharpness.
 #![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::Vec3;
+use renderer::film::Film;
 use renderer::filtering::{Filtering, Report};
-use renderer::render::{Frame, Job};
+use renderer::render::{self, Frame, Job, Observer};
 use tests::small::{PLAIN, SceneFile, adaptive, average, bits, cavity, chequered, room, values, view};
 use tests::synthetic::thorough;
 
@@ -41,6 +44,48 @@ fn threads_change_no_bit() {
         }
     }
     println!("{runs} runs on 1, 2, 3, 5, 7, 16 threads, {spp} spp: same bits, same report");
+}
+
+/// Looks at given numbers of samples, and ends the frame at the last if it is to.
+struct Looker {
+    at: &'static [u64],
+    stops: bool,
+    looks: AtomicUsize,
+}
+
+impl Observer for Looker {
+    fn next_look(&self) -> u64 {
+        self.at.get(self.looks.load(Ordering::Relaxed)).copied().unwrap_or(u64::MAX)
+    }
+
+    fn look(&self, film: &Film, samples: u64) -> bool {
+        assert!(film.filtered() && film.pixel([0, 0]).count() == samples && samples == self.next_look());
+        self.looks.fetch_add(1, Ordering::Relaxed) + 1 == self.at.len() && self.stops
+    }
+}
+
+#[test]
+fn looks_in_mid_block_change_no_bit() {
+    let scene = SceneFile::new(&room([64, 48], 1.0, 1.0, GLOSSY));
+    let look = |at: &'static [u64], stops| {
+        let looker = Looker { at, stops, looks: AtomicUsize::new(0) };
+        let job = Job { scene: scene.path(), ..job(16, adaptive()) };
+        let frame = render::render(&job, &looker).unwrap();
+        assert_eq!(looker.looks.load(Ordering::Relaxed), at.len());
+        frame
+    };
+    let whole = scene.render(job(16, adaptive()));
+    // Blocks are of 4 samples.
+    for at in [&[1][..], &[1, 2, 3], &[5, 7, 10]] {
+        assert_eq!(differing(&whole, &look(at, false)), 0, "looked at {at:?}");
+    }
+    for at in [&[2][..], &[1, 7]] {
+        let range = 0..at[at.len() - 1];
+        let part = scene.render(Job { sample_range: Some(range.clone()), ..job(16, adaptive()) });
+        let stopped = look(at, true);
+        assert_eq!(stopped.samples.ranges(), std::slice::from_ref(&range));
+        assert_eq!(differing(&part, &stopped), 0, "stopped after {range:?}");
+    }
 }
 
 #[test]

@@ -5,14 +5,16 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use renderer::film::Film;
+use renderer::light::Selection;
 use renderer::render::{self, Job, Observer, RenderError};
 use renderer::scene::{Diagnostic, pbrt};
+use renderer::world::World;
 use serde::Serialize;
 
 use super::print;
 use crate::args::{InfoArguments, ReportFormat};
 use crate::exit::Failure;
-use crate::inventory::{Counts, Inventory};
+use crate::inventory::{Counts, Inventory, LENS};
 use crate::job;
 use crate::log::Log;
 use crate::sanitise;
@@ -41,6 +43,55 @@ struct Built {
     unique_primitives: u64,
     seconds: Seconds,
     memory: Memory,
+    follows: Follows,
+}
+
+/// What of the renderer the scene makes use of; the rest costs it nothing.
+#[derive(Serialize)]
+struct Follows {
+    /// What Embree's queries are prepared to meet.
+    queries: String,
+    /// Whether hits are tested against alpha masks; if not, the path loop is one that was compiled without.
+    alpha_tests: bool,
+    /// Dimensions of the sampler that count: at the camera two on the film and two on a lens, and at each vertex one for the
+    /// choice of a light, two for a place on it, one for a lobe, two for a direction and one for roulette.
+    camera_numbers: u32,
+    vertex_numbers: u32,
+    /// How lights are chosen.
+    light_sampler: String,
+    light_tree_bytes: u64,
+    /// Images that textures look at, with their smaller versions.
+    texture_bytes: u64,
+}
+
+impl Follows {
+    fn of(world: &World, lens: bool) -> Self {
+        let lights = world.lights.selection();
+        let sampled = lights.bounded + lights.infinite;
+        Self {
+            queries: world.geometry.scene().features().to_string(),
+            alpha_tests: world.geometry.alpha_test(&world.textures).is_some(),
+            camera_numbers: if lens { 4 } else { 2 },
+            vertex_numbers: 4 + if sampled > 0 { 2 } else { 0 } + u32::from(sampled > 1),
+            light_sampler: light_sampler(&lights),
+            light_tree_bytes: lights.tree_bytes as u64,
+            texture_bytes: world.textures.bytes() as u64,
+        }
+    }
+}
+
+/// How a light is chosen, in words.
+fn light_sampler(lights: &Selection) -> String {
+    let bounded = match lights.bounded {
+        0 => None,
+        1 => Some("the one light, without a choice".to_owned()),
+        count => Some(format!("a tree over {count} lights")),
+    };
+    let infinite = (lights.infinite > 0).then(|| many(lights.infinite as u64, "environment"));
+    let unsampled = (lights.unsampled > 0)
+        .then(|| format!("{} left to BSDF samples", many(lights.unsampled as u64, "environment")));
+    let all: Vec<String> = [bounded, infinite, unsampled].into_iter().flatten().collect();
+    if all.is_empty() { "none".into() } else { all.join(", ") }
 }
 
 #[derive(Serialize)]
@@ -69,7 +120,8 @@ pub fn run(arguments: &InfoArguments, log: &Log) -> Result<(), Failure> {
     let (built, warnings) = if arguments.parse_only {
         (None, read_warnings)
     } else {
-        let (built, warnings) = build(arguments).map_err(|error| job::scene_failure(&error, log))?;
+        let lens = inventory.features.contains(&LENS);
+        let (built, warnings) = build(arguments, lens).map_err(|error| job::scene_failure(&error, log))?;
         (Some(built), warnings)
     };
     let warnings = warnings.iter().map(ToString::to_string).collect();
@@ -94,7 +146,7 @@ impl Observer for Warnings {
 }
 
 /// Builds the scene as for rendering.
-fn build(arguments: &InfoArguments) -> Result<(Built, Vec<Diagnostic>), RenderError> {
+fn build(arguments: &InfoArguments, lens: bool) -> Result<(Built, Vec<Diagnostic>), RenderError> {
     let threads = job::threads(arguments.threads, job::slurm().as_deref());
     let job = Job { scene: arguments.scene.clone(), threads, ..Job::default() };
     let observer = Warnings::default();
@@ -113,6 +165,7 @@ fn build(arguments: &InfoArguments) -> Result<(Built, Vec<Diagnostic>), RenderEr
             film_bytes,
             total_bytes: total_bytes.map(|(resident, peak)| peak.max(resident + film_bytes)),
         },
+        follows: Follows::of(&prepared.world, lens),
     };
     Ok((built, observer.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner)))
 }
@@ -145,14 +198,28 @@ fn text(report: &Report<'_>) -> String {
     if let Some(built) = &report.built {
         row("primitives", &format!("{} in memory, {} with instances", built.unique_primitives, built.primitives));
         row("built in", &format!("{:.2} s, read in {:.2} s", built.seconds.build, built.seconds.parse));
-        let megabytes = |bytes: u64| format!("{:.0} MB", bytes as f64 / 1e6);
+        let follows = &built.follows;
+        let alpha = if follows.alpha_tests { "with alpha tests" } else { "compiled without alpha tests" };
+        row("queries", &format!("for {}; {alpha}", follows.queries));
+        row("light by", &follows.light_sampler);
+        row(
+            "sampler",
+            &format!("{} dimensions at the camera, {} at each vertex", follows.camera_numbers, follows.vertex_numbers),
+        );
+        let megabytes = |bytes: u64| match bytes {
+            0 => "nothing".to_owned(),
+            1..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+            _ => format!("{:.0} MB", bytes as f64 / 1e6),
+        };
         row(
             "memory",
             &format!(
-                "{} in all, of which Embree {}, film {}",
+                "{} in all, of which Embree {}, film {}, image textures {}, light tree {}",
                 built.memory.total_bytes.map_or("unknown".into(), megabytes),
                 megabytes(built.memory.embree_bytes),
                 megabytes(built.memory.film_bytes),
+                megabytes(follows.texture_bytes),
+                megabytes(follows.light_tree_bytes),
             ),
         );
     }

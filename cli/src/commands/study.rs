@@ -72,12 +72,12 @@ fn study(arguments: &StudyArguments, log: &Log, progress: &Progress<'_>) -> Resu
 
 fn csv(points: &[Point]) -> String {
     let mut text = String::from(
-        "setting,spp,seeds,seconds,relmse,relmse_low,relmse_high,relmse_best,squared_bias,squared_bias_error,variance\n",
+        "setting,spp,seeds,seconds,relmse,relmse_low,relmse_high,relmse_best,squared_bias,squared_bias_error,variance,predicted\n",
     );
     for p in points {
         let [low, high] = p.interval;
         text += &format!(
-            "{},{},{},{},{},{low},{high},{},{},{},{}\n",
+            "{},{},{},{},{},{low},{high},{},{},{},{},{}\n",
             p.name,
             p.spp,
             p.seeds,
@@ -86,7 +86,8 @@ fn csv(points: &[Point]) -> String {
             p.relmse_best,
             p.squared_bias,
             p.squared_bias_error,
-            p.variance
+            p.variance,
+            p.predicted.map_or(String::new(), |predicted| predicted.to_string())
         );
     }
     text

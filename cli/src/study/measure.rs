@@ -40,6 +40,8 @@ pub struct Point {
     pub squared_bias_error: f64,
     /// The part that differs from render to render.
     pub variance: f64,
+    /// Mean relMSE as the renders themselves estimate it, if all could tell.
+    pub predicted: Option<f64>,
     /// Of each render.
     #[serde(skip)]
     pub errors: Vec<f64>,
@@ -65,13 +67,16 @@ pub fn measure(plan: &Plan, renders: &Renders, cpu_time: bool) -> Result<Measure
         for &spp in &plan.budgets {
             let of = renders.done.iter().filter(|done| (done.render.setting, done.render.spp) == (setting, spp));
             let mut group = Group::new(&scale);
-            let mut seconds = 0.0;
+            let (mut seconds, mut predicted) = (0.0, Some(0.0));
             for done in of {
                 group.add(&Picture::read(&done.path, None)?)?;
                 let record = &done.record;
                 seconds += if cpu_time { record.cpu_seconds / record.threads as f64 } else { record.seconds };
+                predicted = predicted.zip(record.estimate).map(|(sum, estimate)| sum + estimate);
             }
-            points.push(group.point(setting, name, spp, seconds));
+            let mut point = group.point(setting, name, spp, seconds);
+            point.predicted = predicted.map(|sum| sum / point.seeds as f64);
+            points.push(point);
         }
         intervals(&mut points[first..]);
     }
@@ -186,6 +191,7 @@ impl<'a> Group<'a> {
             squared_bias,
             squared_bias_error: squares.sqrt() / pixels,
             variance: mean(&variances),
+            predicted: None,
             errors: self.errors.clone(),
         }
     }

@@ -60,6 +60,7 @@ pub fn page(study: &Study<'_>) -> Result<String, Failure> {
     html += &study.prices();
     html += &study.errors();
     html += &study.comparison(&pictures)?;
+    html += &study.foretold();
     html += &study.parts();
     html += &study.footer();
     html += "</main>\n<script>\n";
@@ -180,6 +181,47 @@ impl Study<'_> {
         let item =
             |(index, name): (usize, &str)| format!("<li><i class=\"s{}\"></i>{}</li>", index % COLOURS, escaped(name));
         self.plan.settings.iter().map(|setting| setting.name.as_str()).enumerate().map(item).collect()
+    }
+
+    /// What renders thought of their errors.
+    fn foretold(&self) -> String {
+        let known: Vec<(&Point, f64)> =
+            self.points.iter().filter_map(|p| Some((p, p.predicted.filter(|x| *x > 0.0 && p.relmse > 0.0)?))).collect();
+        if known.is_empty() {
+            return String::new();
+        }
+        let frame = Frame { size: [560.0, 400.0], margins: [58.0, 84.0, 28.0, 48.0] };
+        let values = || known.iter().flat_map(|(p, predicted)| [p.relmse, *predicted]);
+        let axis = |title: &str| Axis::over(title, values(), tick);
+        let mut chart = Chart::new(frame, axis("relMSE against the reference"), axis("relMSE as estimated"));
+        let [low, high] = axis("").range;
+        // The diagonal, and what is within a factor of 1.25 of it, cut off by the axes.
+        let near = |x: f64| (x, [(x / 1.25).max(low), (x * 1.25).min(high)]);
+        chart.band("level", &[low, low * 1.25, high / 1.25, high].map(near));
+        chart.line("level", &[[low, low], [high, high]]);
+        let mut off = Vec::new();
+        for index in 0..self.plan.settings.len() {
+            let class = format!("s{}", index % COLOURS);
+            let points: Vec<&(&Point, f64)> = known.iter().filter(|(p, _)| p.setting == index).collect();
+            chart.line(&format!("{class} thin"), &points.iter().map(|(p, y)| [p.relmse, *y]).collect::<Vec<_>>());
+            for (p, predicted) in &points {
+                let (estimate, error) = (number(*predicted), number(p.relmse));
+                let words = format!("{}, {} samples: estimated {estimate}, is {error}", escaped(&p.name), p.spp);
+                chart.dot(&class, [p.relmse, *predicted], false, &words);
+                off.push((predicted / p.relmse).ln().abs());
+            }
+        }
+        off.sort_by(f64::total_cmp);
+        let median = 100.0 * off[off.len() / 2].exp_m1();
+        format!(
+            "<h2>What the renderer knew</h2>\n<p>Every render estimates its own error, without a reference: that is what \
+             <code>--target-error</code> goes by. Half of these estimates, each a mean over seeds, are within \
+             <b>{median:.0} %</b> of the error that was then measured. The band is a factor of 1.25.</p>\n\
+             <div class=\"pair\">\n<div class=\"card\"><h3>Estimated against measured</h3>\n{}</div>\n</div>\n\
+             <ul class=\"legend\">{}</ul>\n",
+            chart.finish("Estimated against measured error"),
+            self.legend(),
+        )
     }
 
     /// Bias and variance of each setting.

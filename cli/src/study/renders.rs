@@ -2,11 +2,14 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use renderer::error::{self, Goal};
 use renderer::film::AovSet;
 use renderer::film::exr;
 use renderer::filtering::Filtering;
+use renderer::frame::Accumulation;
 use renderer::render::{self, Job, Observer, RenderError};
 use renderer::scene::pbrt;
 use serde::{Deserialize, Serialize};
@@ -34,6 +37,9 @@ pub struct Record {
     pub cpu_seconds: f64,
     /// Threads.
     pub threads: usize,
+    /// relMSE as the render itself estimates it; `None` with too few samples to tell.
+    #[serde(default)]
+    pub estimate: Option<f64>,
 }
 
 /// A finished render.
@@ -165,21 +171,30 @@ impl<'a> Studio<'a> {
             filtering,
             ..Job::default()
         };
-        let watch = Watch { studio: self, spp: spp as f64 };
+        let watch = Watch {
+            studio: self,
+            spp: spp as f64,
+            errors: error::Watch::new(Goal::default()),
+            spent: Mutex::default(),
+        };
         let pool = render::thread_pool(job.threads).map_err(|error| job::scene_failure(&error, self.log))?;
         let prepared =
             pool.install(|| render::prepare(&job, &watch)).map_err(|error| job::scene_failure(&error, self.log))?;
         let (start, clock) = (Instant::now(), stats::processor_seconds());
-        let frame = pool.install(|| render::trace(prepared, None, None, &watch).develop());
-        let (seconds, cpu_seconds) = (start.elapsed().as_secs_f64(), stats::processor_seconds() - clock);
+        let mut frame = pool.install(|| render::trace(prepared, None, None, &watch).develop());
+        let spent = *watch.spent.lock().unwrap_or_else(PoisonError::into_inner);
+        let seconds = start.elapsed().as_secs_f64() - spent[0];
+        let cpu_seconds = stats::processor_seconds() - clock - spent[1];
         if !frame.complete() {
             return Err(Failure::Interrupted(
                 "interrupted; what was finished is kept, and the same command goes on from there".into(),
             ));
         }
+        let estimate = pool.install(|| watch.errors.finish(&mut frame.film)).map(|estimate| estimate.relmse);
         let attributes = vec![("Software".to_owned(), oiio::Attribute::Text(job::software()))];
         exr::write(&frame.film, attributes, path).map_err(|error| Failure::Output(error.to_string()))?;
-        let record = Record { key: key.to_owned(), seconds, cpu_seconds, threads: frame.statistics.threads };
+        let threads = frame.statistics.threads;
+        let record = Record { key: key.to_owned(), seconds, cpu_seconds, threads, estimate };
         let text = serde_json::to_string_pretty(&record).expect("a record is plain data with text keys");
         file.write((text + "\n").as_bytes())?;
         Ok(record)
@@ -199,15 +214,27 @@ fn kept(path: &Path, key: &str) -> Option<Record> {
     (record.key == key && path.is_file()).then_some(record)
 }
 
-/// Tells how far the study is while a render of it goes on. The scene's warnings have been shown.
+/// Tells how far the study is while a render of it goes on, and looks at the render's error. The scene's warnings have been
+/// shown.
 struct Watch<'a> {
     studio: &'a Studio<'a>,
     spp: f64,
+    errors: error::Watch,
+    /// Seconds, and those of all processors, that the looks took: a render that nobody looks at does without.
+    spent: Mutex<[f64; 2]>,
 }
 
 impl Observer for Watch<'_> {
     fn progress(&self, done: f64) {
         self.studio.progress.advance((self.studio.done + done * self.spp) / self.studio.total);
+    }
+
+    fn pass_done(&self, frame: &mut Accumulation) {
+        let (start, clock) = (Instant::now(), stats::processor_seconds());
+        self.errors.pass_done(frame);
+        let mut spent = self.spent.lock().unwrap_or_else(PoisonError::into_inner);
+        spent[0] += start.elapsed().as_secs_f64();
+        spent[1] += stats::processor_seconds() - clock;
     }
 
     fn stop_requested(&self) -> bool {

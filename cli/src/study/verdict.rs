@@ -144,6 +144,7 @@ mod tests {
             squared_bias,
             squared_bias_error,
             variance,
+            predicted: None,
             errors,
         }
     }

@@ -17,6 +17,11 @@ fn a_scene_is_counted_and_weighed() {
     assert!(memory["embree_bytes"].as_u64().unwrap() > 0);
     assert!(memory["film_bytes"].as_u64().unwrap() >= 48 * 32 * 8);
     assert!(memory["total_bytes"].as_u64() > memory["film_bytes"].as_u64());
+    // A pinhole; a lamp and a sky that is the same all over, which BSDF samples find: the one light needs no choice.
+    let follows = &report["follows"];
+    assert_eq!((&follows["camera_numbers"], &follows["vertex_numbers"]), (&2.into(), &6.into()), "{follows}");
+    assert_eq!(follows["light_sampler"], "the one light, without a choice, 1 environment left to BSDF samples");
+    assert_eq!((&follows["alpha_tests"], &follows["texture_bytes"]), (&false.into(), &0.into()), "{follows}");
     assert_eq!(bench.files(), ["scene.pbrt"]);
 }
 
@@ -25,7 +30,14 @@ fn the_text_is_for_people() {
     let bench = Bench::new();
     bench.write("scene.pbrt", SCENE);
     let text = bench.succeed(&["info", "scene.pbrt"]).stdout;
-    for word in ["48 x 32 pixels, 4 samples each", "1 sphere", "1 area (shapes)", "gaussian filter", "memory"] {
+    for word in [
+        "48 x 32 pixels, 4 samples each",
+        "1 sphere",
+        "1 area (shapes)",
+        "gaussian filter",
+        "memory",
+        "compiled without alpha tests",
+    ] {
         assert!(text.contains(word), "no {word:?} in {text}");
     }
 }

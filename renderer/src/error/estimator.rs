@@ -174,11 +174,8 @@ impl Add for Moments {
 ///
 /// **Source**: the filter of \[Lee80\] for additive noise.
 fn smoothed(pixels: &[Pixel], width: usize) -> Vec<DVec3> {
-    let moments = |p: &Pixel| Moments {
-        value: p.value,
-        square: p.value.length_squared(),
-        noise: p.noise.length_squared(),
-    };
+    let moments =
+        |p: &Pixel| Moments { value: p.value, square: p.value.length_squared(), noise: p.noise.length_squared() };
     let around = windows(pixels.iter().map(moments).collect(), width, RADIUS, |sum, count| {
         let n = count as f64;
         let mean = sum.value / n;
@@ -214,9 +211,8 @@ mod tests {
 
     /// One pixel of 1000 and of noise as large among pixels of 1 with noise 0.1.
     fn frame(lamp: Option<DVec3>) -> Vec<Pixel> {
-        let mut pixels: Vec<Pixel> = (0..32 * 32)
-            .map(|_| Pixel { value: DVec3::ONE, own: DVec3::ONE, noise: DVec3::splat(0.1) })
-            .collect();
+        let mut pixels: Vec<Pixel> =
+            (0..32 * 32).map(|_| Pixel { value: DVec3::ONE, own: DVec3::ONE, noise: DVec3::splat(0.1) }).collect();
         if let Some(noise) = lamp {
             pixels[16 * 32 + 16] = Pixel { value: DVec3::splat(1e3), own: DVec3::splat(1e3), noise };
         }
@@ -240,7 +236,8 @@ mod tests {
             (pooled[at].x / weights[at].x).sqrt()
         };
         // The lamp is known to 1 %, the pixel to 10 %: pooled, 48 of 49 such squares.
-        let (beside, alone) = (error(&frame(Some(DVec3::splat(10.0))), 16 * 32 + 17), error(&frame(None), 16 * 32 + 17));
+        let (beside, alone) =
+            (error(&frame(Some(DVec3::splat(10.0))), 16 * 32 + 17), error(&frame(None), 16 * 32 + 17));
         assert!((beside / alone - 1.0).abs() < 0.02, "{beside} {alone}");
         assert!((alone - 0.1).abs() < 1e-6, "{alone}");
     }

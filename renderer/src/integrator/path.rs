@@ -215,3 +215,7 @@ impl Vertex<'_> {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "path_tests.rs"]
+mod tests;

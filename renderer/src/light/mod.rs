@@ -61,6 +61,19 @@ pub struct Lights {
     groups: Vec<Arc<str>>,
 }
 
+/// What a light sample chooses from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Selection {
+    /// Lights with a place, by a tree if there are several.
+    pub bounded: usize,
+    /// Infinite ones.
+    pub infinite: usize,
+    /// Infinite ones that BSDF samples alone find.
+    pub unsampled: usize,
+    /// Bytes of the tree.
+    pub tree_bytes: usize,
+}
+
 /// A group of lights, by its number: what its lights send is of interest by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Group(pub u16);
@@ -121,6 +134,16 @@ impl Lights {
     /// There is no light at all.
     pub fn is_empty(&self) -> bool {
         self.tree.is_empty() && self.infinite.is_empty()
+    }
+
+    /// How one of them is chosen for a light sample.
+    pub fn selection(&self) -> Selection {
+        Selection {
+            bounded: self.emitters.len() + self.points.len(),
+            infinite: self.sampled_infinite,
+            unsampled: self.infinite.len() - self.sampled_infinite,
+            tree_bytes: self.tree.bytes(),
+        }
     }
 
     /// Leaves to BSDF samples what they find better: uniform environments entirely, and of environment images what is

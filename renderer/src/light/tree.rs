@@ -59,6 +59,11 @@ struct Node {
 const CLOSEST_SQUARED: f32 = 1.0 / (1u64 << 48) as f32;
 
 impl LightTree {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.slots.as_slice())
+    }
+
     /// The number of lights in it is 0.
     pub fn is_empty(&self) -> bool {
         self.single.is_none() && self.nodes.is_empty()
