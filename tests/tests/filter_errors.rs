@@ -140,7 +140,9 @@ fn bias_vanishes() {
             let bias = references.bias(&average(a), &average(b)).max(0.0).sqrt();
             let error =
                 mean(&images.iter().map(|image| references.error(image, |_, _| true)).collect::<Vec<_>>()).sqrt();
-            println!("{name}, {spp} spp: rms bias {bias:.4}, rms error {error:.4} (bias must fall, and end below half)");
+            println!(
+                "{name}, {spp} spp: rms bias {bias:.4}, rms error {error:.4} (bias must fall, and end below half)"
+            );
             assert!(bias < last);
             // In the cavity, whose walls are near and light is everywhere, it is two thirds: asked for, but not reached.
             assert!(spp < 1024 || name == "cavity" || bias < 0.5 * error);

@@ -3,8 +3,10 @@
 //! Even and odd samples make two independent unfiltered images A and B. With F the filtered one and U the mean of A and B,
 //! (F − A)(F − B) estimates the squared error of F without bias, whatever the sampler's stratification, and (A − B)²/4 that
 //! of U. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal, and less if its tails are
-//! heavier. This is sampling noise alone: where it vanishes so do all doubts, however few pixels of a neighbourhood the
-//! filter has wrong.
+//! heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
+//! has wrong. But where light is rare a few pixels may all have missed it, and seem to be without noise: the variance counts
+//! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it all,
+//! spread over all nine; and [`SCATTER`] of the scatter between pixels is added to it.
 //!
 //! Windows are nested, each thrice the side of the next. From the widest to the narrowest, a window's mean e and standard
 //! error s are weighed against what is believed of the window around it, B: the most probable b for a normal e and a
@@ -59,9 +61,8 @@ pub struct Frame {
 /// When the unfiltered image is believed. The default is measured, not derived.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
-    /// c: how many standard errors an error must exceed to be certain, whatever its surroundings. In the narrowest windows
-    /// it is doubled, for nine pixels of heavy-tailed noise do not know their own standard error, and doubled again where
-    /// those nine speak of the unfiltered image's noise as well.
+    /// c: how many standard errors an error must exceed to be certain, whatever its surroundings; half as much again in the
+    /// narrowest windows, for nine pixels do not know their own standard error well.
     pub doubt: f32,
 }
 
@@ -137,7 +138,9 @@ struct Difference {
 struct Evidence {
     /// Squared error of the filtered value: an unbiased estimate, which may be negative.
     error: f32,
-    /// Variance of that.
+    /// Its square.
+    square: f32,
+    /// Its variance by sampling noise.
     doubt: f32,
     /// Squared error of the unfiltered value.
     noise: f32,
@@ -151,6 +154,7 @@ impl Add for Evidence {
     fn add(self, other: Self) -> Self {
         Self {
             error: self.error + other.error,
+            square: self.square + other.square,
             doubt: self.doubt + other.doubt,
             noise: self.noise + other.noise,
             count: self.count + other.count,
@@ -177,20 +181,23 @@ impl Difference {
             }
         };
         let (variance, both) = (half.length_squared(), mean.dot(half));
-        Evidence {
-            error: mean.length_squared() - variance,
-            doubt: 4.0 * both * both,
-            noise: pixels * variance,
-            count: 1.0,
-        }
+        let error = mean.length_squared() - variance;
+        Evidence { error, square: error * error, doubt: 4.0 * both * both, noise: pixels * variance, count: 1.0 }
     }
 }
 
+/// How much of the scatter between pixels counts as doubt. All of it would, were all errors of a window the same; but one
+/// pixel of nine that is wrong, at three standard errors, is certain only with less than an eighth.
+const SCATTER: f64 = 0.1;
+
 impl Evidence {
-    /// Mean squared error of the filtered value, and the standard error of this mean.
-    fn error(&self) -> [f64; 2] {
-        let n = f64::from(self.count);
-        [f64::from(self.error) / n, f64::from(self.doubt).max(0.0).sqrt() / n]
+    /// Mean squared error of the filtered value, and the standard error of this mean, in view of a wider window.
+    fn error(&self, wider: Option<&Self>) -> [f64; 2] {
+        let mean = |evidence: &Self, sum: f32| f64::from(sum) / f64::from(evidence.count);
+        let error = mean(self, self.error);
+        let scatter = (mean(self, self.square) - error * error).max(0.0);
+        let doubt = mean(self, self.doubt).max(wider.map_or(0.0, |wider| mean(wider, wider.doubt) / 9.0));
+        [error, ((doubt + SCATTER * scatter) / f64::from(self.count)).sqrt()]
     }
 
     /// Mean squared error of the unfiltered value.
@@ -219,14 +226,12 @@ fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sy
     let weight = |i: usize| {
         let mut believed = 0.0;
         for (level, windows) in levels.iter().enumerate().rev() {
-            let [error, standard_error] = windows[i].error();
-            let doubt = if level == 0 { 2.0 * doubt } else { doubt };
+            let [error, standard_error] = windows[i].error(levels.get(level + 1).map(|wider| &wider[i]));
+            let doubt = if level == 0 { 1.5 * doubt } else { doubt };
             believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
         }
-        // The noise of nine pixels may miss all that is bright: it is believed only beside an error beyond all doubt.
-        let [error, standard_error] = levels[0][i].error();
-        let certain = error - 4.0 * doubt * standard_error;
-        share(believed, levels[1][i].noise()).max(share(certain, levels[0][i].noise())) as f32
+        // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
+        if believed > 0.0 { (believed / (believed + levels[1][i].noise())) as f32 } else { 0.0 }
     };
     (0..frame.pixels.len()).into_par_iter().map(weight).collect()
 }
@@ -244,11 +249,6 @@ fn most_probable(error: f64, standard_error: f64, around: f64) -> f64 {
     let root = (m * m + 4.0 * square).sqrt();
     // Twice the same, the second without a difference of like numbers.
     if m > 0.0 { 0.5 * (m + root) } else { 2.0 * square / (root - m) }
-}
-
-/// The share of a value of squared error `noise` beside an independent one of squared error `error`.
-fn share(error: f64, noise: f64) -> f64 {
-    if error > 0.0 { error / (error + noise) } else { 0.0 }
 }
 
 #[cfg(test)]
