@@ -214,11 +214,11 @@ impl Study<'_> {
         off.sort_by(f64::total_cmp);
         let median = 100.0 * off[off.len() / 2].exp_m1();
         format!(
-            "<h2>What the renderer knew</h2>\n<p>Every render estimates its own error, without a reference: that is what \
-             <code>--target-error</code> goes by. Half of these estimates, each a mean over seeds, are within \
-             <b>{median:.0} %</b> of the error that was then measured. The band is a factor of 1.25.</p>\n\
-             <div class=\"pair\">\n<div class=\"card\"><h3>Estimated against measured</h3>\n{}</div>\n</div>\n\
-             <ul class=\"legend\">{}</ul>\n",
+            "<h2>What the renderer knew</h2>\n<div class=\"pair\">\n<div class=\"card\"><h3>Estimated against measured</h3>\n{}\
+             </div>\n<div><p>Every render estimates its own error, without a reference: that is what \
+             <code>--target-error</code> goes by. Dots on the diagonal were right; the band is a factor of 1.25.</p>\n\
+             <p>Half of these estimates, each a mean over seeds, are within <b>{median:.0} %</b> of the error that was then \
+             measured. Renders of too few samples to tell are not shown.</p>\n<ul class=\"legend\">{}</ul></div>\n</div>\n",
             chart.finish("Estimated against measured error"),
             self.legend(),
         )
