@@ -153,6 +153,7 @@ fn store_cells<K: Key>(table: &Table<K>, words: &mut Vec<u64>) -> Vec<u32> {
 
 /// Reads what [`store_cells`] appended.
 fn load_cells(words: &mut Words<'_>, mut cell: impl FnMut(CellKey, &WideSums)) -> Result<(), StoredError> {
+    let mut last = None;
     for _ in 0..words.count(8)? {
         let [low, high, count, weight] = words.take()?;
         let [r, g, b, square] = if count & WIDE == 0 {
@@ -162,6 +163,10 @@ fn load_cells(words: &mut Words<'_>, mut cell: impl FnMut(CellKey, &WideSums)) -
             std::array::from_fn(|i| join(halves[2 * i], halves[2 * i + 1]))
         };
         let key = CellKey::from_bits(join(low, high)).ok_or(StoredError)?;
+        // They come by key, each once: what is added up within one file could reach the bit that says how it is stored.
+        if last.replace(key).is_some_and(|last| last >= key) {
+            return Err(StoredError);
+        }
         cell(key, &WideSums { count: count & !WIDE, weight, rgb: [r, g, b], square });
     }
     Ok(())
@@ -193,5 +198,20 @@ impl Words<'_> {
 
     fn end(&self) -> Result<(), StoredError> {
         if self.0.is_empty() { Ok(()) } else { Err(StoredError) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Found by fuzzing: the counts of one cell, stored twice, added up to the bit that says how its sums are stored.
+    #[test]
+    fn a_cell_comes_once() {
+        const KEY: u64 = 0x4c4c_4c4c_4c4c_4c4c;
+        let cell = [KEY, KEY, 1, 1, 0, 0, 0, 0];
+        let load = |count: u64, cells: &[u64]| load_cells(&mut Words(&[&[count], cells].concat()), |_, _| ());
+        assert_eq!(load(1, &cell), Ok(()));
+        assert_eq!(load(2, &[cell, cell].concat()), Err(StoredError));
     }
 }
