@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use renderer::film::{Aov, AovSet, exr};
 use renderer::render::Slice;
@@ -15,9 +15,11 @@ use crate::exit;
 use crate::frames::Frames;
 
 mod farm;
+mod paths;
 mod study;
 
 pub use farm::{FarmArguments, FarmEngine, OpenjdArguments, SequenceArguments, SlurmArguments};
+pub use paths::PathArguments;
 pub use study::StudyArguments;
 
 /// Renders pbrt-v4 scenes by path tracing.
@@ -136,6 +138,9 @@ pub struct RenderArguments {
     /// How it runs.
     #[command(flatten)]
     pub run: RunArguments,
+    /// Where the scene's files are.
+    #[command(flatten)]
+    pub paths: PathArguments,
 }
 
 /// What is kept on the way.
@@ -247,6 +252,9 @@ pub struct FrameArguments {
     /// Size of the whole frame in pixels [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub resolution: Option<Resolution>,
+    /// Render so many pixels around the frame too: the image's data window grows, its display window does not
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=16384))]
+    pub overscan: u32,
     /// Render part of the frame, given by fractions of its size: x from the left, y from the top
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, conflicts_with = "pixel_bounds")]
     pub crop: Option<[f32; 4]>,
@@ -548,8 +556,13 @@ fn layer_names(mattes: bool) -> PossibleValuesParser {
 }
 
 fn aov_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(AovSet::names().chain(["all"]))
+    let names = AovSet::names().chain(["all"]).map(PossibleValue::from);
+    // Known, to be refused with a reason.
+    PossibleValuesParser::new(names.chain([PossibleValue::new(MOTION).hide(true)]))
 }
+
+/// The output that compositors know and tessera has not.
+pub const MOTION: &str = "motion";
 
 fn sample_range(text: &str) -> Result<Range<u64>, String> {
     let wrong = || "expected first:end, such as 0:64 for the first 64 samples".to_owned();

@@ -1,7 +1,8 @@
 //! Checkpoints: what there is of a frame, stored now and then, and gone on with after a machine has died.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use renderer::frame::{Accumulation, FrameDescription};
@@ -27,8 +28,21 @@ pub struct Checkpoints<'a> {
     interval: Interval,
     resume: Resume,
     log: &'a Log,
-    /// When the last one was written, and passes since then.
-    last: Mutex<(Instant, u64)>,
+    state: Mutex<State>,
+}
+
+struct State {
+    /// When the last one was written.
+    last: Instant,
+    /// Passes since then.
+    passes: u64,
+    publishing: Option<Publishing>,
+}
+
+/// A checkpoint on its way to the disk, while the render goes on.
+struct Publishing {
+    what: String,
+    thread: JoinHandle<(Result<u64, PartError>, Duration)>,
 }
 
 impl<'a> Checkpoints<'a> {
@@ -37,9 +51,10 @@ impl<'a> Checkpoints<'a> {
     /// # Errors
     /// They cannot.
     pub fn new(arguments: &CheckpointArguments, path: Option<PathBuf>, log: &'a Log) -> Result<Self, Failure> {
-        path.as_deref().map(OutputFile::prepare).transpose()?;
-        let last = Mutex::new((Instant::now(), 0));
-        Ok(Self { path, interval: arguments.checkpoint_interval, resume: arguments.resume, log, last })
+        let file = path.as_deref().map(OutputFile::prepare).transpose()?;
+        let path = file.map(|file| file.target().to_owned());
+        let state = Mutex::new(State { last: Instant::now(), passes: 0, publishing: None });
+        Ok(Self { path, interval: arguments.checkpoint_interval, resume: arguments.resume, log, state })
     }
 
     /// What an earlier run has left of this frame.
@@ -64,15 +79,16 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// Writes a checkpoint if it is time.
+    /// Writes a checkpoint if it is time, and none is on its way.
     pub fn pass_done(&self, frame: &mut Accumulation) {
         let due = {
-            let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-            last.1 += 1;
-            match self.interval {
-                Interval::Time(interval) => last.0.elapsed() >= interval,
-                Interval::Passes(interval) => last.1 >= interval,
-            }
+            let mut state = self.state();
+            state.passes += 1;
+            let due = match self.interval {
+                Interval::Time(interval) => state.last.elapsed() >= interval,
+                Interval::Passes(interval) => state.passes >= interval,
+            };
+            due && state.publishing.as_ref().is_none_or(|publishing| publishing.thread.is_finished())
         };
         // At the end there is the picture itself.
         if due && !frame.complete() {
@@ -80,21 +96,54 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// Writes a checkpoint, where there is to be one. That it cannot be written is no reason to stop.
+    /// Writes a checkpoint, where there is to be one, and lets it find its way to the disk. That it cannot be written is no
+    /// reason to stop.
     pub fn write(&self, frame: &mut Accumulation) {
         let Some(path) = &self.path else { return };
+        self.wait();
         let start = Instant::now();
         match part::write(frame, path) {
-            Ok(bytes) => self.log.verbose(&format!(
-                "checkpoint {} of samples {}: {:.1} MB in {:.2} s",
-                path.display(),
-                frame.samples,
-                bytes as f64 / 1e6,
-                start.elapsed().as_secs_f64()
-            )),
-            Err(why) => self.log.warning(&format!("no checkpoint: {why}; the render goes on")),
+            Ok(written) => {
+                let what = format!(
+                    "checkpoint {} of samples {}, written in {:.2} s",
+                    path.display(),
+                    frame.samples,
+                    start.elapsed().as_secs_f64()
+                );
+                let path = path.clone();
+                let thread = std::thread::spawn(move || {
+                    let start = Instant::now();
+                    (written.publish(&path), start.elapsed())
+                });
+                self.state().publishing = Some(Publishing { what, thread });
+            }
+            Err(why) => self.failed(&why),
         }
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = (Instant::now(), 0);
+        let mut state = self.state();
+        (state.last, state.passes) = (Instant::now(), 0);
+    }
+
+    /// Waits for the checkpoint that is on its way, if one is, and tells what became of it.
+    pub fn wait(&self) {
+        let Some(Publishing { what, thread }) = self.state().publishing.take() else { return };
+        // A thread that only waits for the system does not panic.
+        match thread.join() {
+            Ok((Ok(bytes), time)) => self.log.verbose(&format!(
+                "{what}: {:.1} MB, on the disk {:.2} s later",
+                bytes as f64 / 1e6,
+                time.as_secs_f64()
+            )),
+            Ok((Err(why), _)) => self.failed(&why),
+            Err(_) => self.log.warning(&format!("{what}: lost on its way to the disk; the render goes on")),
+        }
+    }
+
+    fn failed(&self, why: &PartError) {
+        self.log.warning(&format!("no checkpoint: {why}; the render goes on"));
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether there are any.
@@ -104,10 +153,17 @@ impl<'a> Checkpoints<'a> {
 
     /// The picture is there: what was stored on the way to it is of no use any more.
     pub fn clear(&self) {
+        self.wait();
         if let Some(path) = &self.path {
             // There may be none.
             let _ = std::fs::remove_file(path);
         }
+    }
+}
+
+impl Drop for Checkpoints<'_> {
+    fn drop(&mut self) {
+        self.wait();
     }
 }
 

@@ -9,7 +9,7 @@ use renderer::filtering::Filtering;
 use renderer::render::RenderError;
 use renderer::scene::Severity;
 
-use crate::args::{CompressionKind, EncodingArguments, FilterArguments, FilterKind, RenderArguments};
+use crate::args::{CompressionKind, EncodingArguments, FilterArguments, FilterKind, MOTION, RenderArguments};
 use crate::exit::Failure;
 use crate::frame_name;
 use crate::log::Log;
@@ -79,6 +79,21 @@ pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Makes sure that there is something to show in all channels.
+///
+/// # Errors
+/// There is not.
+pub fn check_outputs(arguments: &RenderArguments) -> Result<(), Failure> {
+    if arguments.channels.aov.iter().any(|name| name == MOTION) {
+        return Err(Failure::Usage(
+            "--aov motion: nothing moves in a frame, as motion within the shutter is not rendered and frames of a sequence \
+             do not know of each other; leave it out rather than have zeros written"
+                .into(),
+        ));
+    }
+    Ok(())
 }
 
 /// How the frame is to be filtered.

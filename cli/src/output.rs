@@ -1,21 +1,22 @@
-//! Files that appear under their final name only when they are complete.
+//! Files that the command line names, to be written when the work is done.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
+
+use renderer::draft::{self, Draft};
 
 use crate::exit::Failure;
 
-/// A file to be written. Until [`Self::commit`] it is a hidden file beside its final place, which is deleted when this is
-/// dropped.
+/// A file to be written.
 #[derive(Debug)]
 pub struct OutputFile {
     target: PathBuf,
-    part: PathBuf,
 }
 
 impl OutputFile {
-    /// Makes sure, before any work is done, that the file can be written.
+    /// Makes sure, before any work is done, that the file can be written, and removes what killed processes have left of
+    /// it.
     ///
     /// # Errors
     /// The folder is missing or not writable, or something that is not a file has the name.
@@ -29,19 +30,9 @@ impl OutputFile {
             Ok(_) => fs::canonicalize(path).map_err(|why| failure(&why))?,
             Err(_) => path.to_owned(),
         };
-        let Some(name) = target.file_name() else { return Err(failure(&"it has no file name")) };
-        let mut part = std::ffi::OsString::from(".");
-        part.push(name);
-        part.push(format!(".part-{}", std::process::id()));
-        let output = Self { part: target.with_file_name(part), target };
-        match File::create(&output.part) {
-            Ok(_) => {
-                fs::remove_file(&output.part).map_err(|why| failure(&why))?;
-                Ok(output)
-            }
-            Err(why) if why.kind() == io::ErrorKind::NotFound => {
-                Err(failure(&format!("the folder \"{}\" does not exist", output.folder().display())))
-            }
+        match draft::prepare(&target) {
+            Ok(()) => Ok(Self { target }),
+            Err(why) if why.kind() == io::ErrorKind::NotFound => Err(failure(&"its folder does not exist")),
             Err(why) => Err(failure(&why)),
         }
     }
@@ -51,40 +42,30 @@ impl OutputFile {
         &self.target
     }
 
-    /// Where to write.
-    pub fn part(&self) -> &Path {
-        &self.part
+    /// The file in the making.
+    ///
+    /// # Errors
+    /// It cannot be made any more.
+    pub fn draft(&self) -> Result<Draft, Failure> {
+        Draft::create(&self.target).map_err(|why| self.failure(&why))
     }
 
-    /// Gives the written file its final name, once its bytes are on the disk.
+    /// Gives the written file its final name.
     ///
     /// # Errors
     /// The system refuses, for example because the disk is full. The final name then holds what it held before.
-    pub fn commit(self) -> Result<(), Failure> {
-        let commit = || {
-            File::open(&self.part)?.sync_all()?;
-            fs::rename(&self.part, &self.target)?;
-            // The name, too, has to survive a loss of power. Some network file systems cannot do this to a folder.
-            File::open(self.folder()).and_then(|folder| folder.sync_all()).unwrap_or_default();
-            Ok(())
-        };
-        commit().map_err(|why: io::Error| self.failure(&why))
+    pub fn publish(&self, draft: Draft) -> Result<(), Failure> {
+        draft.publish().map_err(|why| self.failure(&why))
     }
 
-    /// Writes all of a file at once and commits it.
+    /// Writes all of a file at once.
     ///
     /// # Errors
-    /// As [`Self::commit`].
-    pub fn write(self, bytes: &[u8]) -> Result<(), Failure> {
-        File::create(&self.part).and_then(|mut file| file.write_all(bytes)).map_err(|why| self.failure(&why))?;
-        self.commit()
-    }
-
-    fn folder(&self) -> &Path {
-        match self.target.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        }
+    /// As [`Self::publish`].
+    pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
+        let draft = self.draft()?;
+        fs::write(draft.path(), bytes).map_err(|why| self.failure(&why))?;
+        self.publish(draft)
     }
 
     fn failure(&self, why: &dyn std::fmt::Display) -> Failure {
@@ -92,42 +73,9 @@ impl OutputFile {
     }
 }
 
-impl Drop for OutputFile {
-    fn drop(&mut self) {
-        // Committed, or never written: then there is nothing to delete.
-        fs::remove_file(&self.part).unwrap_or_default();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
-    }
-
-    #[test]
-    fn a_file_appears_only_when_it_is_committed() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.json");
-        fs::write(&path, "old").unwrap();
-        let output = OutputFile::prepare(&path).unwrap();
-        fs::write(output.part(), "new").unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
-        output.commit().unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), "new");
-        assert_eq!(names(folder.path()), ["a.json"]);
-    }
-
-    #[test]
-    fn an_abandoned_file_leaves_nothing_behind() {
-        let folder = tempfile::tempdir().unwrap();
-        let output = OutputFile::prepare(&folder.path().join("a.exr")).unwrap();
-        fs::write(output.part(), "half").unwrap();
-        drop(output);
-        assert!(names(folder.path()).is_empty());
-    }
 
     #[test]
     fn a_link_keeps_pointing_to_its_target() {
@@ -148,5 +96,6 @@ mod tests {
             assert_eq!(failure.code(), 4, "{failure}");
             assert!(failure.to_string().contains(&*bad.to_string_lossy()), "{failure}");
         }
+        assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
     }
 }

@@ -23,7 +23,7 @@ pub struct Stats<'a> {
     /// Size of the whole frame.
     pub resolution: [u32; 2],
     /// The pixels that were rendered, x0 x1 y0 y1, upper ends exclusive.
-    pub pixel_bounds: [u32; 4],
+    pub pixel_bounds: [i64; 4],
     /// The samples that were taken of each pixel, upper end exclusive.
     pub samples: [u64; 2],
     /// Seed.

@@ -9,6 +9,7 @@ use crate::pairs::Lobe as PairLobe;
 use crate::record::{Lobe, PathRecord, Vertex};
 use crate::shards::{ShardedIndex, ShardedTable};
 use crate::shrink::{Shrinkage, estimate};
+use crate::sides::Sides;
 use crate::sums::{LUMINANCE, Quantum};
 use crate::table::Table;
 
@@ -96,7 +97,7 @@ pub(crate) fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
 /// Sums over all paths so far.
 #[derive(Debug)]
 pub struct Adaptive {
-    params: Params,
+    pub(crate) params: Params,
     quantum: Quantum,
     /// Of first vertices, in both lobes.
     grids: Vec<Grid>,
@@ -231,6 +232,22 @@ impl Adaptive {
         let estimates = estimates.collect();
         self.cells = Some(count);
         estimates
+    }
+
+    /// The side of the finest cells that the paths of each slot were put into, by part: the geometric mean over throughput,
+    /// in the units of the anchor. Estimates are means over these or, where differences are noise, over larger ones.
+    pub fn cell_sides(&mut self) -> Vec<Vec<(u32, f32)>> {
+        let trees = self.params.trees;
+        let of_part = |part: &mut Part| {
+            part.pairs.settle();
+            let (cells, mut sides) = (&part.cells, Sides::default());
+            sides.add(part.pairs.settled(), trees, |pair| {
+                let tree = pair.tree_of(2 * trees as usize);
+                cells[tree / trees as usize][tree % trees as usize].key(pair.index() as u32).level()
+            });
+            sides.mean(trees)
+        };
+        self.parts.par_iter_mut().map(of_part).collect()
     }
 
     /// Says that cells have come.

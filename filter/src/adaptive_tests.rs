@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::{PackedRgb, StoredError};
+use crate::{Branch, Merging, PackedRgb, Slots, StoredError};
 
 const ANCHOR: Anchor = Anchor { origin: DVec3::ZERO, extent: 8.0 };
 
@@ -38,19 +38,34 @@ fn add(filter: &mut Adaptive, samples: std::ops::Range<u64>) {
     }
 }
 
-/// The words of every part.
-fn stored(filter: &mut Adaptive) -> Vec<Vec<u64>> {
-    let part = |at| {
-        let mut words = Vec::new();
-        filter.store_part(at, &mut words);
+const TREES: usize = 8;
+
+fn slots(part: usize) -> std::ops::Range<u32> {
+    16 * part as u32..16 * (part as u32 + 1)
+}
+
+/// The words of every tree of every part, and of every part's slots.
+fn stored(filter: &mut Adaptive) -> Vec<Vec<Vec<u64>>> {
+    filter.settle();
+    let part = |part| {
+        let mut words = vec![Vec::new(); TREES + 1];
+        (0..TREES).for_each(|tree| filter.store_tree(tree, part, &slots(part), &mut words[tree]));
+        filter.store_slots(part, &slots(part), &mut words[TREES]);
         words
     };
     (0..5).map(part).collect()
 }
 
-fn load(filter: &mut Adaptive, part: usize, words: &[u64]) -> Result<(), StoredError> {
-    let first = 16 * part as u32;
-    filter.load_part(part, first..first + 16, words)
+fn read(part: usize, tree: usize, words: &[u64]) -> Result<Branch, StoredError> {
+    Branch::read(&filter().params, tree, &slots(part), words)
+}
+
+fn load(filter: &mut Adaptive, part: usize, words: &[Vec<u64>]) -> Result<(), StoredError> {
+    for (tree, words) in words[..TREES].iter().enumerate() {
+        filter.add_tree(tree, part, &read(part, tree, words)?);
+    }
+    filter.add_slots(part, &Slots::read(&slots(part), &words[TREES])?);
+    Ok(())
 }
 
 #[test]
@@ -112,26 +127,77 @@ fn epochs_matter() {
 }
 
 #[test]
+fn stored_sums_of_several_filters_resolve_tree_by_tree_to_the_bits_of_the_whole() {
+    let mut whole = filter();
+    add(&mut whole, 0..8);
+    let (expected, expected_words) = (whole.resolve(), stored(&mut whole));
+    let parts = [6, 0, 4, 2].map(|epoch| {
+        let mut slice = filter();
+        add(&mut slice, epoch..epoch + 2);
+        stored(&mut slice)
+    });
+    for count in [4, 1] {
+        let parts = if count == 1 { std::slice::from_ref(&expected_words) } else { &parts[..] };
+        let mut merging = Merging::new(&filter().params, 5, true);
+        let mut words = vec![vec![Vec::new(); TREES + 1]; 5];
+        for tree in [3, 7, 0, 1, 2, 6, 5, 4] {
+            let branches = (0..5).map(|part| {
+                let shares = parts.iter().map(|words| read(part, tree, &words[part][tree]).unwrap());
+                let sum = Branch::sum(shares.collect());
+                sum.store(&slots(part), &mut words[part][tree]);
+                sum
+            });
+            merging.add_tree(branches.collect());
+        }
+        for part in 0..5 {
+            let mut sum = Slots::default();
+            parts.iter().for_each(|words| sum.add(Slots::read(&slots(part), &words[part][TREES]).unwrap()));
+            sum.store(&slots(part), &mut words[part][TREES]);
+            assert_eq!(merging.resolve(part, &sum), expected[part]);
+        }
+        assert!(words == expected_words);
+        assert_eq!(merging.cell_sides(), Some(whole.cell_sides()));
+        let report = Report { bytes: 0, second_cells: 0, ..whole.report() };
+        assert_eq!(Report { bytes: 0, ..merging.report(whole.paths()) }, report);
+    }
+}
+
+#[test]
 fn words_that_are_no_sums_are_refused() {
     let mut whole = filter();
     add(&mut whole, 0..4);
     let words = &stored(&mut whole)[1];
     assert_eq!(load(&mut filter(), 1, words), Ok(()));
-    assert_eq!(load(&mut filter(), 2, words), Err(StoredError), "slots of another part");
-    for end in (0..words.len()).step_by(97) {
-        assert_eq!(load(&mut filter(), 1, &words[..end]), Err(StoredError), "{end} words");
+    assert_eq!(Branch::read(&whole.params, 0, &(16..18), &words[0]), Err(StoredError), "more slots than the part has");
+    assert_eq!(Slots::read(&(16..18), &words[TREES]), Err(StoredError), "more slots than the part has");
+    for words in [&words[0], &words[TREES - 1], &words[TREES]] {
+        let refused = |words: &[u64]| read(1, 0, words).is_err() && Slots::read(&slots(1), words).is_err();
+        for end in (0..words.len()).step_by(17) {
+            assert!(refused(&words[..end]), "{end} words");
+        }
     }
-    let other = Params { trees: 3, ..Params::default() };
-    assert_eq!(load(&mut Adaptive::new(&other, &ANCHOR, 5), 1, words), Err(StoredError), "three trees");
     // Whatever the words are, nothing panics.
-    for at in 0..words.len() {
-        for value in [0, 1, u64::MAX, words[at] ^ 1 << 63] {
-            let mut wrong = words.clone();
-            wrong[at] = value;
-            let mut filter = filter();
-            if load(&mut filter, 1, &wrong).and_then(|()| load(&mut filter, 1, words)).is_ok() && at % 50 == 0 {
-                filter.resolve();
+    for stored in 0..=TREES {
+        for at in 0..words[stored].len() {
+            for value in [0, 1, u64::MAX, words[stored][at] ^ 1 << 63] {
+                let mut wrong = words.clone();
+                wrong[stored][at] = value;
+                let mut filter = filter();
+                if load(&mut filter, 1, &wrong).and_then(|()| load(&mut filter, 1, words)).is_ok() && at % 50 == 0 {
+                    filter.resolve();
+                }
             }
         }
     }
+}
+
+#[test]
+fn sides_are_those_of_the_finest_cells() {
+    let mut filter = filter();
+    add(&mut filter, 0..8);
+    let sides = filter.cell_sides();
+    assert!(sides.iter().all(|part| part.len() == 16));
+    // Footprints of 0.03 and leaves of a quarter to one of `leaf` of them, in four trees.
+    let largest = 0.03 * filter.params.leaf;
+    assert!(sides.iter().flatten().all(|(_, side)| (0.25 * largest..=largest).contains(side)), "{sides:?}");
 }

@@ -41,7 +41,8 @@ impl Pair {
         if self.slot_lobe_tree >> TREE_BITS & 1 == 0 { Lobe::Diffuse } else { Lobe::Glossy }
     }
 
-    fn tree(&self) -> u32 {
+    /// Which tree of its lobe it reads.
+    pub fn tree(&self) -> u32 {
         self.slot_lobe_tree & ((1 << TREE_BITS) - 1)
     }
 
@@ -64,16 +65,22 @@ impl Pair {
         Self { cell, ..self }
     }
 
-    /// As words, to be stored.
-    pub fn to_words(self) -> [u64; 3] {
-        let [r, g, b] = self.throughput.map(|x| u64::from(x as u32));
-        [u64::from(self.slot_lobe_tree) | u64::from(self.cell) << 32, r | g << 32, b]
+    /// A pair of `slot` and a cell of one of `trees` trees, diffuse and then glossy; `None` for a slot that no pair can have.
+    pub fn of_tree(slot: u32, tree: usize, trees: usize, cell: u32, throughput: [i32; 3]) -> Option<Self> {
+        let (lobe, tree) = if tree < trees / 2 { (Lobe::Diffuse, tree) } else { (Lobe::Glossy, tree - trees / 2) };
+        let slot_lobe_tree = Self::label(slot, lobe, tree as u32);
+        let pair = Self { slot_lobe_tree, cell, throughput };
+        (pair.slot() == slot).then_some(pair)
     }
 
-    /// From [`Self::to_words`].
-    pub fn from_words([labels, rg, b]: [u64; 3]) -> Self {
-        let throughput = [rg as i32, (rg >> 32) as i32, b as i32];
-        Self { slot_lobe_tree: labels as u32, cell: (labels >> 32) as u32, throughput }
+    /// Throughput in quanta.
+    pub fn throughput(&self) -> [i32; 3] {
+        self.throughput
+    }
+
+    /// Adds up those of the same slot and cell, which come one after the other, as far as sums fit.
+    pub fn unite(pairs: &mut Vec<Self>) {
+        pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
     }
 
     /// Adds another pair's throughput, if it fits.
@@ -105,7 +112,8 @@ impl Own {
         Self { glossy: [list(0), list(3)], unfiltered: [list(6), list(9)] }
     }
 
-    fn absorb(&mut self, other: &Self) {
+    /// Adds other sums.
+    pub fn absorb(&mut self, other: &Self) {
         let (mine, others) = (self.to_words(), other.to_words());
         *self = Self::from_words(std::array::from_fn(|i| mine[i].saturating_add(others[i])));
     }
@@ -178,16 +186,30 @@ impl Pairs {
         }
     }
 
-    /// All pairs and own sums, of blocks that have ended.
-    pub fn parts(&mut self) -> (&[Pair], &[(u32, Own)]) {
+    /// Orders the pairs of blocks that have ended.
+    pub fn settle(&mut self) {
         self.compact();
-        (&self.pairs, &self.own)
+    }
+
+    /// All pairs by slot and cell, after [`Self::settle`].
+    pub fn settled(&self) -> &[Pair] {
+        assert_eq!(self.compact, self.pairs.len(), "pairs are read before they were settled");
+        &self.pairs
+    }
+
+    /// Sums of slots that need no cell.
+    pub fn own_sums(&self) -> &[(u32, Own)] {
+        &self.own
     }
 
     /// Adds others', whose cells have the numbers of the large tables.
-    pub fn absorb(&mut self, pairs: impl Iterator<Item = Pair>, own: &[(u32, Own)]) {
+    pub fn absorb(&mut self, pairs: impl Iterator<Item = Pair>) {
         self.pairs.extend(pairs);
         self.end_block();
+    }
+
+    /// Adds others' own sums.
+    pub fn absorb_own(&mut self, own: &[(u32, Own)]) {
         for (slot, sums) in own {
             self.own(*slot).absorb(sums);
         }
@@ -197,7 +219,7 @@ impl Pairs {
         self.pairs[self.compact..].sort_unstable_by_key(Pair::order);
         // The stable sort finds the two sorted runs and merges them.
         self.pairs.sort_by_key(Pair::order);
-        self.pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
+        Pair::unite(&mut self.pairs);
         self.compact = self.pairs.len();
         self.pairs.shrink_to(self.compact + self.compact / 2);
     }
@@ -215,24 +237,56 @@ impl Pairs {
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
     pub fn resolve(&mut self, quantum: &Quantum, read: impl Fn(Lobe, usize, u32) -> [f32; 3]) -> Vec<(u32, Resolved)> {
         self.compact();
-        // Products are rounded one by one and summed as integers: the order of cells within a slot, which depends on who
-        // met them first, does not count.
+        let mut gathered = Gathered::default();
+        gathered.add(&self.pairs, quantum, |pair| read(pair.lobe(), pair.tree() as usize, pair.cell));
+        gathered.resolve(&self.own, quantum)
+    }
+}
+
+/// What slots have read from cells, by slot: through diffuse lobes and through glossy ones.
+///
+/// Products of throughput and estimate are rounded one by one and summed as integers: the order of cells within a slot,
+/// which depends on who met them first, does not count, nor that of trees.
+#[derive(Debug, Default)]
+pub(crate) struct Gathered(Vec<(u32, [[i128; 3]; 2])>);
+
+impl Gathered {
+    /// Adds what sorted pairs read when `read` tells the estimate of a pair's cell. All pairs of a tree come at once.
+    pub fn add(&mut self, pairs: &[Pair], quantum: &Quantum, read: impl Fn(&Pair) -> [f32; 3]) {
         let scale = 2f64.powi(RESOLVED_BITS);
-        let mut sums: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
+        let sums = &mut self.0;
+        let before = sums.len();
         // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
         // where the overflow came does not count either.
-        for same in self.pairs.chunk_by(|a, b| a.order() == b.order()) {
+        for same in pairs.chunk_by(|a, b| a.order() == b.order()) {
             let pair = &same[0];
             let throughput: [i64; 3] = std::array::from_fn(|c| same.iter().map(|p| i64::from(p.throughput[c])).sum());
-            if sums.last().is_none_or(|(slot, _)| *slot != pair.slot()) {
+            if sums[before..].last().is_none_or(|(slot, _)| *slot != pair.slot()) {
                 sums.push((pair.slot(), Default::default()));
             }
             let Some((_, lobes)) = sums.last_mut() else { continue };
-            let estimate = read(pair.lobe(), pair.tree() as usize, pair.cell);
-            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(estimate) {
+            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(read(pair)) {
                 *sum += (throughput as f64 * f64::from(x) / quantum.radiance() * scale) as i128;
             }
         }
+        if before == 0 {
+            return;
+        }
+        // Two sorted runs.
+        sums.sort_by_key(|(slot, _)| *slot);
+        sums.dedup_by(|(slot, next), (kept, lobes)| {
+            let same = slot == kept;
+            if same {
+                let lobes = lobes.as_flattened_mut().iter_mut();
+                lobes.zip(next.as_flattened()).for_each(|(sum, x)| *sum += x);
+            }
+            same
+        });
+    }
+
+    /// What every slot gets, with its own sums.
+    pub fn resolve(&self, own: &[(u32, Own)], quantum: &Quantum) -> Vec<(u32, Resolved)> {
+        let scale = 2f64.powi(RESOLVED_BITS);
         let radiance = |sum: [i128; 3]| {
             let unit = quantum.radiance() / scale * 2f64.powi(-THROUGHPUT_BITS);
             (DVec3::from_array(sum.map(|x| x as f64)) * unit).as_vec3()
@@ -246,9 +300,9 @@ impl Pairs {
             glossy_own: own.glossy.map(own_radiance),
         };
         // Both lists are by slot, and a slot may be in one alone.
-        let mut own = self.own.iter().peekable();
-        let mut slots = Vec::with_capacity(sums.len());
-        for (slot, lobes) in sums {
+        let mut own = own.iter().peekable();
+        let mut slots = Vec::with_capacity(self.0.len());
+        for &(slot, lobes) in &self.0 {
             while let Some((slot, own)) = own.next_if(|(at, _)| *at < slot) {
                 slots.push((*slot, resolved(Default::default(), own)));
             }

@@ -92,13 +92,13 @@ pub struct Deposit {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sums {
     /// Deposits.
-    count: u64,
+    pub count: u64,
     /// Σ weight.
-    weight: u64,
+    pub weight: u64,
     /// Σ weight · radiance.
-    rgb: [u64; 3],
+    pub rgb: [u64; 3],
     /// Σ weight · luminance².
-    square: u64,
+    pub square: u64,
 }
 
 /// The same sums without a limit: 2⁴⁰ of the largest deposits fit.

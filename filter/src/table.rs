@@ -60,6 +60,16 @@ impl<K> Default for Table<K> {
 }
 
 impl<K: Key> Table<K> {
+    /// A table of cells that are all different.
+    pub fn from_cells(cells: Vec<(K, WideSums)>) -> Self {
+        let mut table = Self { cells: Vec::with_capacity(cells.len()), ..Self::default() };
+        for ((key, sums), number) in cells.into_iter().zip(0..) {
+            table.cells.push(Cell { key, sums: Sums::default() });
+            table.merge(number, &sums);
+        }
+        table
+    }
+
     /// Number of the cell of `key`, which is made if there is none.
     #[inline]
     pub fn cell(&mut self, key: K) -> u32 {
@@ -86,7 +96,8 @@ impl<K: Key> Table<K> {
 
     #[cold]
     fn grow(&mut self) {
-        let length = (2 * self.slots.len()).max(64);
+        // Twice as long, or as long as it takes where there never were slots.
+        let length = (2 * self.slots.len()).max(2 * (self.cells.len() + 1)).max(64).next_power_of_two();
         self.slots = vec![0; length];
         for (cell, number) in self.cells.iter().zip(1..) {
             let mut at = cell.key.hash() as usize & (length - 1);

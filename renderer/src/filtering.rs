@@ -10,14 +10,14 @@ mod tile;
 use std::ops::Range;
 
 use filter::talk::{self, Talk};
-use filter::{Adaptive, Anchor, PathRecord, Resolved, StoredError};
+use filter::{Adaptive, Anchor, Branch, PathRecord, Resolved, Slots, StoredError};
 use glam::{Mat3, Vec3};
 
 pub use blend::Blend;
 pub use settings::SettingError;
 pub use tile::{Keep, Keeper, Nothing, Paths, Selection, Watching};
 
-use crate::film::{Film, Layer};
+use crate::film::{Aov, AovSet, Film, FilterMap, Layer};
 use crate::math::Rgb;
 
 /// How a frame is filtered.
@@ -46,6 +46,14 @@ impl Filtering {
             }
         }
         self
+    }
+
+    /// Settings of the adaptive filter, if it is the one.
+    pub fn adaptive(&self, surroundings: &Surroundings) -> Option<filter::Params> {
+        match self {
+            Self::Adaptive(params, _) => Some(filter::Params { unit: surroundings.unit, ..*params }),
+            Self::None | Self::Talk(..) => None,
+        }
     }
 
     /// Slices of a frame begin and end at multiples of this many samples.
@@ -158,20 +166,62 @@ impl FrameFilter {
         }
     }
 
-    /// Appends the sums of a tile of the film.
-    pub fn store(&mut self, tile: usize, words: &mut Vec<u64>) {
-        if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
-            adaptive.store_part(tile, words);
+    /// Number of trees of cells, which are stored one by one.
+    pub fn stored_trees(&self) -> usize {
+        match &self.sharing {
+            Sharing::Adaptive(adaptive, _) => adaptive.stored_trees(),
+            Sharing::Talk(..) => 0,
         }
     }
 
-    /// Adds what [`Self::store`] appended for a tile with these pixels.
+    /// Makes ready for [`Self::store_tree`].
+    pub fn settle(&mut self) {
+        if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
+            adaptive.settle();
+        }
+    }
+
+    /// Appends the share that a tile with these pixels has of a tree.
+    pub fn store_tree(&self, tree: usize, tile: usize, pixels: &Range<u32>, words: &mut Vec<u64>) {
+        if let Sharing::Adaptive(adaptive, _) = &self.sharing {
+            adaptive.store_tree(tree, tile, pixels, words);
+        }
+    }
+
+    /// Appends what the filter keeps of a tile's pixels besides.
+    pub fn store_slots(&self, tile: usize, pixels: &Range<u32>, words: &mut Vec<u64>) {
+        if let Sharing::Adaptive(adaptive, _) = &self.sharing {
+            adaptive.store_slots(tile, pixels, words);
+        }
+    }
+
+    /// Adds what [`Self::store_tree`] appended.
     ///
     /// # Errors
-    /// There are no such sums; some of them may have been added.
-    pub fn load(&mut self, tile: usize, pixels: Range<usize>, words: &[u64]) -> Result<(), StoredError> {
+    /// There are no such sums.
+    pub fn load_tree(
+        &mut self,
+        tree: usize,
+        tile: usize,
+        pixels: &Range<u32>,
+        words: &[u64],
+    ) -> Result<(), StoredError> {
         match &mut self.sharing {
-            Sharing::Adaptive(adaptive, _) => adaptive.load_part(tile, pixels.start as u32..pixels.end as u32, words),
+            Sharing::Adaptive(adaptive, _) => adaptive.load_tree(tree, tile, pixels, words),
+            Sharing::Talk(..) => Err(StoredError),
+        }
+    }
+
+    /// Adds what [`Self::store_slots`] appended.
+    ///
+    /// # Errors
+    /// As for [`Self::load_tree`].
+    pub fn load_slots(&mut self, tile: usize, pixels: &Range<u32>, words: &[u64]) -> Result<(), StoredError> {
+        match &mut self.sharing {
+            Sharing::Adaptive(adaptive, _) => {
+                adaptive.add_slots(tile, &Slots::read(pixels, words)?);
+                Ok(())
+            }
             Sharing::Talk(..) => Err(StoredError),
         }
     }
@@ -188,7 +238,7 @@ impl FrameFilter {
     /// Goes on with what [`Self::store_epoch`] appended.
     ///
     /// # Errors
-    /// As for [`Self::load`].
+    /// As for [`Self::load_tree`].
     pub fn load_epoch(&mut self, next: u64, words: &[u64]) -> Result<(), StoredError> {
         match &mut self.sharing {
             Sharing::Adaptive(adaptive, _) if !words.is_empty() => adaptive.load_epoch(next, words),
@@ -229,6 +279,9 @@ impl FrameFilter {
             }
             Sharing::Adaptive(adaptive, blend) => {
                 let resolved = adaptive.resolve();
+                if film.outputs().aovs.contains(Aov::FilterCell) {
+                    film.set_map(FilterMap::Cell, by_slot(film, adaptive.cell_sides()));
+                }
                 blend_into(film, resolved, blend, self.coarse, expose);
                 Report::Adaptive(adaptive.report())
             }
@@ -239,12 +292,60 @@ impl FrameFilter {
     pub fn finish(mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
         match self.sharing {
             Sharing::Talk(..) => self.develop(surroundings, film),
-            Sharing::Adaptive(adaptive, blend) => {
+            Sharing::Adaptive(mut adaptive, blend) => {
+                if film.outputs().aovs.contains(Aov::FilterCell) {
+                    film.set_map(FilterMap::Cell, by_slot(film, adaptive.cell_sides()));
+                }
                 let (resolved, report) = adaptive.finish();
                 blend_into(film, resolved, &blend, self.coarse, |radiance| surroundings.response * radiance);
                 Report::Adaptive(report)
             }
         }
+    }
+}
+
+/// A frame's filter that is resolved from stored sums, tree by tree.
+pub struct Merging {
+    sums: filter::Merging,
+    blend: Blend,
+    coarse: f32,
+}
+
+impl Merging {
+    /// A filter over so many tiles, of a frame with these outputs; `None` if it has no filter, or one that cannot be stored.
+    pub fn new(filtering: &Filtering, surroundings: &Surroundings, tiles: usize, aovs: AovSet) -> Option<Self> {
+        let Filtering::Adaptive(_, blend) = *filtering else { return None };
+        let measured = aovs.contains(Aov::FilterCell);
+        let sums = filter::Merging::new(&filtering.adaptive(surroundings)?, tiles, measured);
+        Some(Self { sums, blend, coarse: surroundings.unit * COARSE })
+    }
+
+    /// Adds a tree, by tile.
+    pub fn add_tree(&mut self, branches: Vec<Branch>) {
+        self.sums.add_tree(branches);
+    }
+
+    /// What each pixel of a tile gets, once all trees were added.
+    pub fn resolve(&self, tile: usize, slots: &Slots) -> Vec<(u32, Resolved)> {
+        self.sums.resolve(tile, slots)
+    }
+
+    /// Gives the film its filtered values from what all its tiles got. `paths` are as [`FrameFilter::paths`] counts them.
+    pub fn finish(
+        self,
+        paths: [u64; 2],
+        resolved: Vec<Vec<(u32, Resolved)>>,
+        surroundings: &Surroundings,
+        film: &mut Film,
+    ) -> Report {
+        let Self { sums, blend, coarse } = self;
+        let report = Report::Adaptive(sums.report(paths));
+        if let Some(sides) = sums.cell_sides() {
+            film.set_map(FilterMap::Cell, by_slot(film, sides));
+        }
+        drop(sums);
+        blend_into(film, resolved, &blend, coarse, |radiance| surroundings.response * radiance);
+        report
     }
 }
 
@@ -261,15 +362,22 @@ fn blend_into(
     let bounds = film.bounds();
     let frame = blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
     drop(resolved);
-    let mut values = frame.blend(blend);
+    let (mut values, mut shares) = frame.blend(blend);
     drop(frame);
     let coarse = expose(Vec3::splat(coarse)).max_element();
     // At the other end, sums of what fits singly need not fit.
     let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
-    for (value, at) in values.iter_mut().zip(bounds.pixels()).filter(|(value, _)| !usable(value)) {
-        *value = film.pixel(at).mean().as_vec3();
+    for ((value, share), at) in values.iter_mut().zip(&mut shares).zip(bounds.pixels()) {
+        if !usable(value) {
+            (*value, *share) = (film.pixel(at).mean().as_vec3(), 1.0);
+        }
     }
     film.set_filtered(&values);
+    if film.outputs().aovs.contains(Aov::FilterBlend) {
+        let mut by_index = vec![0.0; film.slots()];
+        bounds.pixels().zip(shares).for_each(|(at, share)| by_index[film.index(at)] = share);
+        film.set_map(FilterMap::Blend, by_index);
+    }
 }
 
 /// How samples are cut into blocks: they do not cross epochs, and within an epoch borders are multiples of a length, so

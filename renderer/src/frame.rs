@@ -28,7 +28,9 @@ pub struct FrameDescription {
     pub scene_hash: u64,
     /// Width and height of the whole frame.
     pub resolution: [u32; 2],
-    /// The pixels that are rendered.
+    /// Pixels around it that there is room for, on every side.
+    pub overscan: u32,
+    /// The pixels that are rendered; column and row [`Self::overscan`] are the frame's first.
     pub bounds: Bounds,
     /// Auxiliary outputs.
     pub aovs: AovSet,
@@ -51,7 +53,7 @@ pub struct FrameDescription {
 impl FrameDescription {
     /// All that two slices of a frame must share for their samples to belong to one picture, in words, one line each.
     pub fn settings(&self) -> Vec<(&'static str, String)> {
-        let Bounds { min, max } = self.bounds;
+        let ([x0, x1], [y0, y1]) = (self.in_frame(0), self.in_frame(1));
         let filter = self.filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
         vec![
             ("version", env!("CARGO_PKG_VERSION").into()),
@@ -60,7 +62,7 @@ impl FrameDescription {
             ("seed", self.seed.to_string()),
             ("samples per pixel", self.spp.to_string()),
             ("resolution", format!("{}x{}", self.resolution[0], self.resolution[1])),
-            ("pixels", format!("{},{},{},{}", min[0], max[0], min[1], max[1])),
+            ("pixels", format!("{x0},{x1},{y0},{y1}")),
             ("channels", self.aovs.iter().map(film::Aov::name).collect::<Vec<_>>().join(",")),
             ("filter", self.filtering.name().to_owned() + &filter.collect::<String>()),
         ]
@@ -70,6 +72,22 @@ impl FrameDescription {
     pub fn outputs(&self) -> Outputs {
         let groups = if self.aovs.contains(film::Aov::Light) { self.light_groups.clone() } else { Vec::new() };
         Outputs { aovs: self.aovs, groups }
+    }
+
+    /// First and one past the last column (axis 0) or row (1) that is rendered, in the frame: less than 0 around it.
+    pub fn in_frame(&self, axis: usize) -> [i64; 2] {
+        [self.bounds.min, self.bounds.max].map(|corner| i64::from(corner[axis]) - i64::from(self.overscan))
+    }
+
+    /// An empty film for it.
+    pub fn film(&self) -> Film {
+        let filtered = self.filtering != Filtering::None;
+        Film::new(self.resolution, self.bounds, self.outputs(), filtered).with_overscan(self.overscan)
+    }
+
+    /// Number of tiles of its film.
+    pub fn tile_count(&self) -> usize {
+        film::tile_count(self.bounds)
     }
 
     /// The first of [`Self::settings`] in which another frame differs: its name, and both values.
@@ -158,8 +176,7 @@ impl Accumulation {
     /// # Panics
     /// If the filter's settings are not valid, which is checked when a job is prepared.
     pub fn new(description: FrameDescription) -> Self {
-        let filtered = description.filtering != Filtering::None;
-        let film = Film::new(description.resolution, description.bounds, description.outputs(), filtered);
+        let film = description.film();
         let filter = FrameFilter::new(&description.filtering, &description.surroundings, &film)
             .expect("the settings of a frame's filter are valid");
         Self { description, film, filter, samples: Samples::default(), counters: Counters::default() }
@@ -195,11 +212,18 @@ impl Accumulation {
             .ok()
             .flatten()
             .expect("the settings of a frame's filter are valid");
+        filter.settle();
         let mut words = Vec::new();
         for tile in 0..film.tile_count() {
+            let pixels = film::tile_slots(tile);
+            for tree in 0..filter.stored_trees() {
+                words.clear();
+                filter.store_tree(tree, tile, &pixels, &mut words);
+                copy.load_tree(tree, tile, &pixels, &words).expect("a filter takes its own sums");
+            }
             words.clear();
-            filter.store(tile, &mut words);
-            copy.load(tile, Film::tile_slots(tile), &words).expect("a filter takes its own sums");
+            filter.store_slots(tile, &pixels, &mut words);
+            copy.load_slots(tile, &pixels, &words).expect("a filter takes its own sums");
         }
         words.clear();
         filter.store_epoch(samples.start, &mut words);

@@ -34,6 +34,7 @@ pub mod interaction;
 pub mod world;
 pub mod compile;
 pub mod integrator;
+pub mod draft;
 pub mod film;
 pub mod filtering;
 pub mod frame;

@@ -19,6 +19,7 @@ use crate::filtering::{
 };
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
+use crate::part;
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
 use crate::world::{Techniques, World};
@@ -28,6 +29,8 @@ use crate::world::{Techniques, World};
 pub struct Job {
     /// The scene file.
     pub scene: PathBuf,
+    /// Where the files are that it names.
+    pub path_map: scene::PathMap,
     /// Samples per pixel of the whole frame; `None`: the file's.
     pub spp: Option<u64>,
     /// Seed of all randomness; `None`: the file's.
@@ -38,6 +41,8 @@ pub struct Job {
     pub lock_seed: bool,
     /// Size of the frame; `None`: the file's.
     pub resolution: Option<[u32; 2]>,
+    /// Pixels to render around the frame on every side.
+    pub overscan: u32,
     /// Part of the frame, x0 x1 y0 y1 in [0, 1].
     pub crop: Option<[f32; 4]>,
     /// Part of the frame, x0 x1 y0 y1 in pixels, upper ends exclusive. Wins over `crop`.
@@ -211,6 +216,14 @@ impl Frame {
     }
 }
 
+impl From<part::Merged> for Frame {
+    fn from(merged: part::Merged) -> Self {
+        let part::Merged { film, description, samples, counters, report } = merged;
+        let statistics = Statistics { counters, filter: report, ..Statistics::default() };
+        Self { film, description, samples, statistics }
+    }
+}
+
 /// What a job took.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
@@ -302,7 +315,8 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     oiio::set_threads(1)?;
     observer.phase(Phase::Parse);
     let start = Instant::now();
-    let (mut description, warnings) = scene::pbrt::load(&job.scene).map_err(RenderError::Scene)?;
+    let (mut description, warnings) =
+        scene::pbrt::load_mapped(&job.scene, &job.path_map).map_err(RenderError::Scene)?;
     warnings.iter().for_each(|warning| observer.warning(warning));
     apply(job, &mut description);
     statistics.parse_seconds = start.elapsed().as_secs_f64();
@@ -356,6 +370,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         asked,
         scene_hash: description.sources.hash(),
         resolution: world.sensor.resolution,
+        overscan: world.sensor.overscan,
         bounds: world.sensor.bounds,
         aovs,
         light_groups: world.lights.groups().to_vec(),
@@ -628,9 +643,9 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
 ) -> Counters {
     let mut counters = Counters::default();
     tile.for_each(|mut pixel| {
-        let [x, y] = pixel.at;
+        let [x, y] = world.sensor.in_frame(pixel.at);
         for index in pass.clone() {
-            let numbers = sampler.pixel_sample([x, y], index);
+            let numbers = sampler.pixel_sample([x as u32, y as u32], index);
             let offset = world.filter.sample(numbers.d2(Dimension::FILM));
             let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
             let mut recorder = keeper.recorder();
@@ -699,6 +714,7 @@ fn apply(job: &Job, description: &mut scene::Scene) {
         description.film.resolution = resolution;
         description.film.pixel_bounds = None;
     }
+    description.film.overscan = job.overscan;
     if let Some(crop) = job.crop {
         description.film.crop_window = Some(crop);
         description.film.pixel_bounds = None;

@@ -88,7 +88,9 @@ impl Bounds {
 pub struct Sensor {
     /// Width and height of the frame in pixels.
     pub resolution: [u32; 2],
-    /// The pixels to render.
+    /// Pixels around the frame that there is room for, on every side.
+    pub overscan: u32,
+    /// The pixels to render; column and row [`Self::overscan`] are the frame's first.
     pub bounds: Bounds,
     /// Film RGB from scene RGB.
     pub response: glam::Mat3,
@@ -97,6 +99,12 @@ pub struct Sensor {
 }
 
 impl Sensor {
+    /// Column and row in the frame of a pixel of the film, less than 0 around it.
+    #[inline]
+    pub fn in_frame(&self, pixel: [u32; 2]) -> [i32; 2] {
+        pixel.map(|at| at.wrapping_sub(self.overscan) as i32)
+    }
+
     /// Film RGB of a sample's radiance, and the share of it that the sensor takes: less than 1 only if it clamps.
     pub fn expose(&self, radiance: Rgb) -> (Rgb, f32) {
         let exposed = self.response * radiance;

@@ -71,7 +71,7 @@ pub fn add(sum: &mut Film, film: &Film) {
     let mut words = Vec::new();
     film.store(0..film.slots(), &mut words);
     let mut rest = words.as_slice();
-    sum.load(0..sum.slots(), &mut rest).expect("what was stored");
+    sum.tiles().iter_mut().try_for_each(|tile| tile.load(&mut rest)).expect("what was stored");
     assert!(rest.is_empty(), "films of different shapes");
 }
 

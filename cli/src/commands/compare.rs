@@ -46,7 +46,7 @@ pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
         ReportFormat::Json => json(&comparison),
     })?;
     if let Some(output) = output {
-        write_difference(&image, &reference, output)?;
+        write_difference(&image, &reference, &output)?;
         log.verbose("the difference image is written");
     }
     judge(arguments, &comparison)
@@ -108,7 +108,7 @@ fn json(result: &Comparison) -> String {
     text + "\n"
 }
 
-fn write_difference(image: &Picture, reference: &Picture, output: OutputFile) -> Result<(), Failure> {
+fn write_difference(image: &Picture, reference: &Picture, output: &OutputFile) -> Result<(), Failure> {
     let difference = |(i, r): (&[f32; 3], &[f32; 3])| {
         let signed = [i[0] - r[0], i[1] - r[1], i[2] - r[2]];
         let [x, y, z] = signed.map(f32::abs);
@@ -117,8 +117,9 @@ fn write_difference(image: &Picture, reference: &Picture, output: OutputFile) ->
     let pixels: Vec<f32> = image.pixels.iter().zip(&reference.pixels).flat_map(difference).collect();
     let names = ["R", "G", "B", "signed.R", "signed.G", "signed.B"];
     let channel = |name: &str| Channel { name: name.to_owned(), format: Format::Float };
+    let draft = output.draft()?;
     let written = oiio::write(&oiio::Output {
-        path: output.part(),
+        path: draft.path(),
         file_format: oiio::FileFormat::Exr,
         data_window: reference.data_window,
         display_window: reference.display_window,
@@ -128,7 +129,7 @@ fn write_difference(image: &Picture, reference: &Picture, output: OutputFile) ->
         compression: oiio::Compression::Zip,
     });
     written.map_err(|error| Failure::Output(error.to_string()))?;
-    output.commit()
+    output.publish(draft)
 }
 
 fn judge(arguments: &CompareArguments, result: &Comparison) -> Result<(), Failure> {

@@ -42,8 +42,9 @@ pub fn run(arguments: &DenoiseArguments, log: &Log) -> Result<(), Failure> {
     }
     let guides = guides.map(|(albedo, normal, _)| [albedo, normal]);
     let denoised = oidn.denoise(&Pictures { width: image.width, height: image.height, color, guides })?;
-    write(&image, &denoised, &oidn, &output)?;
-    output.commit()?;
+    let draft = output.draft()?;
+    write(&image, &denoised, &oidn, draft.path())?;
+    output.publish(draft)?;
     log.info(&format!("wrote {}", arguments.output.display()));
     Ok(())
 }
@@ -62,7 +63,7 @@ fn layer(image: &Image, names: &[&str; 3]) -> Option<Vec<[f32; 3]>> {
 }
 
 /// Writes the denoised colour with the image's own coverage, windows and metadata. Other layers stay in the noisy file.
-fn write(image: &Image, denoised: &[[f32; 3]], oidn: &Oidn, output: &OutputFile) -> Result<(), Failure> {
+fn write(image: &Image, denoised: &[[f32; 3]], oidn: &Oidn, path: &Path) -> Result<(), Failure> {
     let alpha = image.channels.iter().position(|channel| channel == "A");
     let names: &[&str] = if alpha.is_some() { &["R", "G", "B", "A"] } else { &["R", "G", "B"] };
     let mut pixels = Vec::with_capacity(denoised.len() * names.len());
@@ -74,7 +75,7 @@ fn write(image: &Image, denoised: &[[f32; 3]], oidn: &Oidn, output: &OutputFile)
     let mut attributes: Vec<_> = image.attributes.iter().filter(|(name, _)| !of_layers(name)).cloned().collect();
     attributes.push(("tessera/denoiser".into(), Attribute::Text(oidn.name().into())));
     let written = oiio::write(&oiio::Output {
-        path: output.part(),
+        path,
         file_format: oiio::FileFormat::Exr,
         data_window: image.data_window,
         display_window: image.display_window,

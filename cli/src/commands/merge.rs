@@ -1,14 +1,13 @@
 //! `tessera merge`: parts of a frame's samples become the frame.
 
-use std::path::Path;
 use std::time::Instant;
 
+use rayon::ThreadPool;
 use renderer::error::{Goal, Watch};
 use renderer::film::{Aov, exr};
 use renderer::filtering::Filtering;
-use renderer::frame::{Accumulation, Samples};
-use renderer::part::{self, Part, PartError};
-use renderer::render::{Statistics, Traced};
+use renderer::part::{Part, PartError, Parts};
+use renderer::render::{Frame, Statistics, Traced};
 
 use crate::args::MergeArguments;
 use crate::exit::Failure;
@@ -16,6 +15,7 @@ use crate::job;
 use crate::log::Log;
 use crate::metadata;
 use crate::output::OutputFile;
+use crate::stats;
 
 /// Runs the command.
 pub fn run(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
@@ -43,40 +43,46 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
         .map_err(|error| Failure::Render(error.to_string()))?;
 
     let start = Instant::now();
-    let parts = arguments.parts.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>().map_err(refused)?;
-    let missing = check(&parts)?;
+    let parts = arguments.parts.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>().map_err(failure)?;
+    let count = parts.len();
+    for part in &parts {
+        log.verbose(&format!("{}: samples {}", part.path.display(), part.samples));
+    }
+    let parts = Parts::new(parts).map_err(failure)?;
+    let samples = parts.samples.to_string();
+    if to_part {
+        let written = pool.install(|| parts.write(file.target()));
+        written.and_then(|written| written.publish(file.target())).map_err(failure)?;
+    } else {
+        develop(arguments, parts, &pool, &file, log)?;
+    }
+    log.info(&format!(
+        "wrote {}: samples {samples} of {count} parts, in {:.2} s; peak memory {}",
+        output.display(),
+        start.elapsed().as_secs_f64(),
+        stats::peak_memory().map_or("unknown".into(), |bytes| format!("{:.2} GB", bytes as f64 / 1e9))
+    ));
+    Ok(())
+}
+
+/// Adds parts up to an image.
+fn develop(
+    arguments: &MergeArguments,
+    parts: Parts,
+    pool: &ThreadPool,
+    file: &OutputFile,
+    log: &Log,
+) -> Result<(), Failure> {
     let encoding = job::encoding(&arguments.encoding);
-    parts.first().map_or(Ok(()), |part| job::check_encoding(&encoding, part.description.aovs))?;
-    if let Some(missing) = missing.filter(|_| !to_part && !arguments.partial) {
+    job::check_encoding(&encoding, parts.description.aovs)?;
+    if let Some(missing) = parts.missing().filter(|_| !arguments.partial) {
         return Err(Failure::Input(format!(
             "samples {}:{} of {} are in none of the parts; add the part that has them, or give --partial for an image of \
              what there is",
-            missing.start, missing.end, parts[0].description.spp
+            missing.start, missing.end, parts.description.spp
         )));
     }
-    let count = parts.len();
-    let mut frame: Option<Accumulation> = None;
-    let watch = watch(&parts);
-    for part in parts {
-        log.verbose(&format!("adding {}: samples {}", part.path.display(), part.samples));
-        let frame = frame.get_or_insert_with(|| {
-            let mut description = part.description.clone();
-            description.asked = 0..description.spp;
-            Accumulation::new(description)
-        });
-        part.add_to(frame).map_err(refused)?;
-        if let Some(watch) = watch.as_ref().filter(|_| !to_part) {
-            pool.install(|| watch.pass_done(frame));
-        }
-    }
-    let mut frame = frame.ok_or_else(|| Failure::Usage("there are no parts to merge".into()))?;
-    if to_part {
-        part::write(&mut frame, file.target()).map_err(|error| Failure::Output(error.to_string()))?;
-        tell(log, output, count, &frame.samples, start);
-        return Ok(());
-    }
-    let statistics = Statistics { counters: frame.counters, ..Statistics::default() };
-    let mut frame = pool.install(|| Traced { frame, statistics }.develop());
+    let (mut frame, watch) = pool.install(|| add_up(parts)).map_err(failure)?;
     let error = watch.and_then(|watch| watch.finish(&mut frame.film));
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
@@ -84,57 +90,30 @@ fn merge(arguments: &MergeArguments, log: &Log) -> Result<(), Failure> {
     let attributes = metadata::of_frame(&frame, error.as_ref(), arguments.provenance);
     exr::write_as(&frame.film, attributes, &encoding, file.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
-    tell(log, output, count, &frame.samples, start);
     Ok(())
 }
 
-/// Who looks at the frame's error. Without a filter the sums tell it as they do in a render of the whole; with one the frame
-/// is compared with what it was after some of the parts, if somebody asks.
-fn watch(parts: &[Part]) -> Option<Watch> {
-    let description = &parts.first()?.description;
-    let asked = description.filtering == Filtering::None || description.aovs.contains(Aov::Error);
-    asked.then(|| Watch::new(Goal::default()))
-}
-
-/// Makes sure that all parts are of one frame and share no sample, before any of them is read; the first samples that none
-/// has.
-fn check(parts: &[Part]) -> Result<Option<std::ops::Range<u64>>, Failure> {
-    let Some(first) = parts.first() else { return Ok(None) };
-    let mut samples = Samples::default();
-    for (at, part) in parts.iter().enumerate() {
-        if let Some((what, ours, theirs)) = first.description.difference(&part.description) {
-            return Err(Failure::Input(format!(
-                "{} and {} are of different pictures: their {what} is \"{ours}\" and \"{theirs}\"",
-                first.path.display(),
-                part.path.display()
-            )));
-        }
-        for range in part.samples.ranges() {
-            let Err(both) = samples.insert(range.clone()) else { continue };
-            let has = |other: &&Part| {
-                other.samples.ranges().iter().any(|known| known.start < both.end && both.start < known.end)
-            };
-            let other = parts[..at].iter().find(has).unwrap_or(first);
-            return Err(Failure::Input(format!(
-                "{} and {} both have samples {}:{}; leave one of them out",
-                other.path.display(),
-                part.path.display(),
-                both.start,
-                both.end
-            )));
-        }
+/// The frame that parts add up to, and who has looked at its error. Without a filter the sums tell it as they do in a render
+/// of the whole; with one the frame is compared with what it was after some of the parts, if somebody asks: then all sums
+/// are held.
+fn add_up(parts: Parts) -> Result<(Frame, Option<Watch>), PartError> {
+    let watch = Watch::new(Goal::default());
+    if parts.description.filtering == Filtering::None {
+        return Ok((parts.develop()?.into(), Some(watch)));
     }
-    Ok(Some(samples.missing(&(0..first.description.spp))).filter(|missing| !missing.is_empty()))
+    if !parts.description.aovs.contains(Aov::Error) {
+        return Ok((parts.develop()?.into(), None));
+    }
+    let frame = parts.accumulate(|frame| watch.pass_done(frame))?;
+    let statistics = Statistics { counters: frame.counters, ..Statistics::default() };
+    Ok((Traced { frame, statistics }.develop(), Some(watch)))
 }
 
-fn refused(error: PartError) -> Failure {
-    Failure::Input(error.to_string())
-}
-
-fn tell(log: &Log, output: &Path, count: usize, samples: &Samples, start: Instant) {
-    log.info(&format!(
-        "wrote {}: samples {samples} of {count} parts, in {:.2} s",
-        output.display(),
-        start.elapsed().as_secs_f64()
-    ));
+/// What is wrong with a part is wrong with the input, unless it is the one to be written.
+fn failure(error: PartError) -> Failure {
+    match error {
+        PartError::File { what: "write", .. } => Failure::Output(error.to_string()),
+        PartError::None => Failure::Usage(error.to_string()),
+        _ => Failure::Input(error.to_string()),
+    }
 }

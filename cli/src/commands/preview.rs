@@ -19,8 +19,9 @@ pub fn run(arguments: &PreviewArguments, log: &Log) -> Result<(), Failure> {
     let shown = |value: &f32| tone::display(arguments.tone, gain * value);
     let pixels: Vec<f32> = picture.pixels.iter().flatten().map(shown).collect();
     let window = oiio::Window::at_origin(picture.width, picture.height);
+    let draft = output.draft()?;
     let written = oiio::write(&oiio::Output {
-        path: output.part(),
+        path: draft.path(),
         file_format: oiio::FileFormat::Png,
         data_window: window,
         display_window: window,
@@ -30,7 +31,7 @@ pub fn run(arguments: &PreviewArguments, log: &Log) -> Result<(), Failure> {
         compression: oiio::Compression::default(),
     });
     written.map_err(|error| Failure::Output(error.to_string()))?;
-    output.commit()?;
+    output.publish(draft)?;
     log.info(&format!("wrote {}", arguments.output.display()));
     Ok(())
 }

@@ -40,8 +40,9 @@ pub fn data_url(picture: &Picture, gain: f32, path: &Path) -> Result<String, Fai
     let pixels: Vec<f32> = picture.pixels.iter().flatten().map(|x| tone::display(Tone::Filmic, gain * x)).collect();
     let window = oiio::Window::at_origin(picture.width, picture.height);
     let file = OutputFile::prepare(path)?;
+    let draft = file.draft()?;
     let written = oiio::write(&oiio::Output {
-        path: file.part(),
+        path: draft.path(),
         file_format: oiio::FileFormat::Png,
         data_window: window,
         display_window: window,
@@ -51,8 +52,8 @@ pub fn data_url(picture: &Picture, gain: f32, path: &Path) -> Result<String, Fai
         compression: oiio::Compression::default(),
     });
     written.map_err(|error| Failure::Output(error.to_string()))?;
-    let bytes = std::fs::read(file.part());
-    file.commit()?;
+    let bytes = std::fs::read(draft.path());
+    file.publish(draft)?;
     let bytes = bytes.map_err(|why| Failure::Output(format!("cannot read \"{}\" again: {why}", path.display())))?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(bytes)))
 }

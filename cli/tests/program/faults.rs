@@ -44,7 +44,10 @@ struct Figures {
     /// Ends that left a checkpoint to go on from.
     resumed: usize,
     partial_images: usize,
+    /// Left by ends.
     hidden_files: usize,
+    /// Still there when the next run was done.
+    hidden_files_left: usize,
     broken_files: usize,
     frames: usize,
     differing_frames: usize,
@@ -89,6 +92,11 @@ fn end_at(bench: &Bench, end: End, moment: Duration, resume: &str) -> Option<i32
     child.wait().unwrap().code()
 }
 
+/// Number of hidden files.
+fn hidden(bench: &Bench) -> usize {
+    bench.files().iter().filter(|name| name.starts_with('.')).count()
+}
+
 impl Figures {
     /// Looks at what an end has left. Whether there is a checkpoint: it is read by the next run, which requires it.
     fn inspect(&mut self, bench: &Bench, code: Option<i32>) -> bool {
@@ -100,10 +108,7 @@ impl Figures {
         } else if code == Some(0) {
             self.broken_files += 1;
         }
-        for name in bench.files().iter().filter(|name| name.starts_with('.')) {
-            self.hidden_files += 1;
-            std::fs::remove_file(bench.path(name)).unwrap();
-        }
+        self.hidden_files += hidden(bench);
         checkpoint.exists()
     }
 }
@@ -146,6 +151,7 @@ fn whenever_a_render_is_ended_the_frame_comes_out_the_same() {
         let run = bench.run(&[&RENDER[..], &["--resume", resume]].concat());
         assert_eq!(run.code, 0, "{}", run.stderr);
         figures.frames += 1;
+        figures.hidden_files_left += hidden(&bench);
         figures.differing_frames += usize::from(std::fs::read(bench.path("frame.exr")).unwrap() != expected);
         assert!(!bench.path("frame.checkpoint").exists(), "a checkpoint of what is complete");
     }
@@ -153,6 +159,7 @@ fn whenever_a_render_is_ended_the_frame_comes_out_the_same() {
     {
         println!("{tried} moments within {:.2} s each: {figures:#?}", whole.as_secs_f64());
     }
-    assert_eq!((figures.broken_files, figures.differing_frames), (0, 0), "{figures:#?}");
+    let faults = (figures.broken_files, figures.differing_frames, figures.hidden_files_left);
+    assert_eq!(faults, (0, 0, 0), "{figures:#?}");
     assert!(figures.killed > 0 && figures.terminated > 0 && figures.resumed > 0, "no moment was tried: {figures:#?}");
 }

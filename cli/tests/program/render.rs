@@ -77,6 +77,51 @@ fn crops_are_the_same_pixels_in_a_window_of_the_frame() {
 }
 
 #[test]
+fn overscan_adds_pixels_around_the_frame_and_changes_none_in_it() {
+    let bench = bench();
+    let render = |window: &[&str], name: &str| {
+        bench.succeed(&[&["render", "scene.pbrt", "--filter", "none", "-o", name], window].concat());
+        read(&bench.path(name))
+    };
+    let (full, wide) = (render(&[], "full.exr"), render(&["--overscan", "5"], "wide.exr"));
+    assert_eq!((wide.data_window.x, wide.data_window.y, wide.width, wide.height), (-5, -5, 58, 42));
+    assert_eq!(wide.display_window, full.display_window);
+    let channels = full.channels.len();
+    for y in 0..32 {
+        let row = &wide.pixels[((y + 5) * 58 + 5) * channels..][..48 * channels];
+        assert_eq!(row, &full.pixels[y * 48 * channels..][..48 * channels], "row {y}");
+    }
+    // A part of it, by way of a part.
+    let bounds = ["--overscan", "5", "--pixel-bounds", "-5,3,-9,2"];
+    let corner = render(&bounds, "corner.exr");
+    assert_eq!((corner.data_window.x, corner.data_window.y, corner.width, corner.height), (-5, -5, 8, 7));
+    assert_eq!(corner.pixels[..8 * channels], wide.pixels[..8 * channels]);
+    bench.succeed(&[&["render", "scene.pbrt", "--filter", "none", "-o", "corner.part"], &bounds[..]].concat());
+    bench.succeed(&["merge", "corner.part", "-o", "merged.exr"]);
+    assert!(bytes(&bench, "merged.exr") == bytes(&bench, "corner.exr"));
+}
+
+#[test]
+fn files_are_where_the_path_map_says() {
+    let bench = bench();
+    bench.succeed(&["render", "scene.pbrt", "-o", "one.exr"]);
+    std::fs::create_dir(bench.path("here")).unwrap();
+    std::fs::copy(bench.path("scene.pbrt"), bench.path("here/all.pbrt")).unwrap();
+    bench.write("from windows.pbrt", "Include \"P:/show/all.pbrt\"");
+    bench.write("mapped.pbrt", "Include \"/nowhere/show/all.pbrt\"");
+    bench.fail(&["render", "mapped.pbrt", "-o", "two.exr"], 3, &["/nowhere/show/all.pbrt"]);
+    let here = bench.path("here");
+    let rules = format!("/nowhere/show={}", here.display());
+    bench.succeed(&["render", "mapped.pbrt", "-o", "two.exr", "--path-map", &rules]);
+    let rules = serde_json::json!({ "version": "pathmapping-1.0", "path_mapping_rules": [
+        { "source_path_format": "WINDOWS", "source_path": "p:\\show", "destination_path": here } ] });
+    bench.write("rules.json", &rules.to_string());
+    bench.succeed(&["render", "from windows.pbrt", "-o", "three.exr", "--path-map", "rules.json"]);
+    let pixels = |name: &str| read(&bench.path(name)).pixels;
+    assert!(pixels("two.exr") == pixels("one.exr") && pixels("three.exr") == pixels("one.exr"));
+}
+
+#[test]
 fn metadata_says_what_was_rendered_and_no_more() {
     let bench = bench();
     bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--spp", "8", "--sample-range", "2:5", "--seed", "9"]);

@@ -54,6 +54,7 @@ fn outputs_are_checked_before_anything_is_read() {
     bench.fail(&["render", "none.pbrt", "-o", "a.png"], 2, &["a.png", ".exr", "tessera preview"]);
     bench.fail(&["render", "none.pbrt", "-o", "none/a.exr"], 4, &["none/a.exr", "does not exist"]);
     bench.fail(&["render", "none.pbrt", "-o", "file/a.exr"], 4, &["file/a.exr"]);
+    bench.fail(&["render", "none.pbrt", "-o", "a.exr", "--aov", "P,motion"], 2, &["motion", "nothing moves"]);
     bench.fail(&["render", "none.pbrt", "-o", "a.exr", "--stats", "none/s.json"], 4, &["none/s.json"]);
     bench.fail(&["render", "none.pbrt", "-o", "a.exr", "--log-file", "none/log"], 4, &["none/log"]);
     bench.fail(&["preview", "none.exr", "-o", "a.jpg"], 2, &["a.jpg", ".png"]);

@@ -125,12 +125,13 @@ fn textures(scene: &Scene) -> StageResult<Textures> {
 
 fn sensor(scene: &Scene, report: &mut Report<'_>) -> Option<Sensor> {
     let film = &scene.film;
-    let Some([min, max]) = rendered_pixels(film.resolution, film.crop_window, film.pixel_bounds) else {
+    let Some([min, max]) = rendered_pixels(film.resolution, film.overscan, film.crop_window, film.pixel_bounds) else {
         report.errors([(film.span, "the crop window or pixel bounds leave no pixel of the frame to render".into())]);
         return None;
     };
     Some(Sensor {
         resolution: film.resolution,
+        overscan: film.overscan,
         bounds: Bounds { min, max },
         response: film.sensor,
         max_component: film.max_component_value,

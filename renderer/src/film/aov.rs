@@ -38,6 +38,10 @@ pub enum Aov {
     DenoiseNormal,
     /// `error.{R,G,B}`: standard error of the pixel, film RGB.
     Error,
+    /// `filter.blend`: the share of the pixel's own, unfiltered value in it: 0 where the filter was believed.
+    FilterBlend,
+    /// `filter.cell`: side of the finest cells that the filter put the pixel's paths into, world units; 0 for none.
+    FilterCell,
     /// `CryptoObject00.{R,G,B,A}` and so on: coverage by objects' names.
     CryptoObject,
     /// `CryptoMaterial00.{R,G,B,A}` and so on: coverage by materials' names.
@@ -46,7 +50,7 @@ pub enum Aov {
 
 impl Aov {
     /// All of them, in the order of their channels.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 18] = [
         Self::Albedo,
         Self::Normal,
         Self::GeometricNormal,
@@ -61,6 +65,8 @@ impl Aov {
         Self::DenoiseAlbedo,
         Self::DenoiseNormal,
         Self::Error,
+        Self::FilterBlend,
+        Self::FilterCell,
         Self::CryptoObject,
         Self::CryptoMaterial,
     ];
@@ -82,6 +88,8 @@ impl Aov {
             Self::DenoiseAlbedo => "denoise.albedo",
             Self::DenoiseNormal => "denoise.N",
             Self::Error => "error",
+            Self::FilterBlend => "filter.blend",
+            Self::FilterCell => "filter.cell",
             Self::CryptoObject => "CryptoObject",
             Self::CryptoMaterial => "CryptoMaterial",
         }
@@ -99,7 +107,7 @@ impl Aov {
         match self {
             Self::Normal | Self::GeometricNormal | Self::Position | Self::DenoiseNormal => of(name, "XYZ"),
             Self::Depth => of(name, "Z"),
-            Self::SampleCount => vec![name.into()],
+            Self::SampleCount | Self::FilterBlend | Self::FilterCell => vec![name.into()],
             // Two ranks a layer: id and coverage, id and coverage.
             Self::CryptoObject | Self::CryptoMaterial => {
                 (0..RANKS / 2).flat_map(|layer| of(&format!("{name}{layer:02}"), "RGBA")).collect()
@@ -133,6 +141,8 @@ impl Aov {
             Self::DenoiseAlbedo => sum(Layer::DenoiseAlbedo),
             Self::DenoiseNormal => sum(Layer::DenoiseNormal),
             Self::Error => vec![Shown::Error],
+            Self::FilterBlend => vec![Shown::Filter(FilterMap::Blend)],
+            Self::FilterCell => vec![Shown::Filter(FilterMap::Cell)],
             Self::CryptoObject => vec![Shown::Matte(Named::Object)],
             Self::CryptoMaterial => vec![Shown::Matte(Named::Material)],
         }
@@ -148,8 +158,19 @@ pub(super) enum Shown {
     Count,
     /// The standard error.
     Error,
+    /// What the filter did.
+    Filter(FilterMap),
     /// Ids and coverages, in two channels a rank.
     Matte(Named),
+}
+
+/// What a filter tells of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilterMap {
+    /// See [`Aov::FilterBlend`].
+    Blend,
+    /// See [`Aov::FilterCell`].
+    Cell,
 }
 
 /// What a film shows besides radiance and coverage.
@@ -183,7 +204,7 @@ impl Outputs {
         let shown = self.shown().into_iter();
         let mattes = shown.filter_map(|shown| match shown {
             Shown::Matte(named) => Some(named),
-            Shown::Sum(_) | Shown::Count | Shown::Error => None,
+            Shown::Sum(_) | Shown::Count | Shown::Error | Shown::Filter(_) => None,
         });
         mattes.collect()
     }
@@ -193,7 +214,7 @@ impl Outputs {
         let shown = self.shown().into_iter();
         let layers = shown.filter_map(|shown| match shown {
             Shown::Sum(layer) => Some(layer),
-            Shown::Count | Shown::Error | Shown::Matte(_) => None,
+            Shown::Count | Shown::Error | Shown::Filter(_) | Shown::Matte(_) => None,
         });
         layers.chain(filtered.then_some(Layer::Prefix)).collect()
     }

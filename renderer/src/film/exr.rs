@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use oiio::{Attribute, Channel, Compression, FileFormat, Format, Output, Window};
 
 use super::Film;
+use crate::draft::Draft;
 
 /// What keeps an image from being written.
 #[derive(Debug, thiserror::Error)]
@@ -82,8 +83,7 @@ pub fn write(film: &Film, attributes: Vec<(String, Attribute)>, path: &Path) -> 
 
 /// Writes the film's image to `path`, with `attributes` as its metadata.
 ///
-/// The file appears under its name only when it is whole: it is written beside it as `.NAME.part-PID`, synced, and
-/// renamed. The bytes depend on the film and the attributes alone.
+/// The file appears under its name only when it is whole. The bytes depend on the film and the attributes alone.
 ///
 /// # Errors
 /// The folder is absent or not writable, or the disk is full; then there is no new file, and an old one is untouched.
@@ -96,13 +96,13 @@ pub fn write_as(
     let image = film.image();
     let (bounds, [width, height]) = (film.bounds(), film.resolution());
     let file_error = |why| WriteError::File { path: path.to_owned(), why };
-    let part = part_path(path).map_err(file_error)?;
+    let draft = Draft::create(path).map_err(file_error)?;
     let output = Output {
-        path: &part,
+        path: draft.path(),
         file_format: FileFormat::Exr,
         data_window: Window {
-            x: bounds.min[0] as i32,
-            y: bounds.min[1] as i32,
+            x: bounds.min[0] as i32 - film.overscan() as i32,
+            y: bounds.min[1] as i32 - film.overscan() as i32,
             width: bounds.width() as usize,
             height: bounds.height() as usize,
         },
@@ -116,33 +116,9 @@ pub fn write_as(
         attributes,
         compression: encoding.compression,
     };
-    let written = oiio::write(&output)
-        .map_err(|why| WriteError::Image { path: path.to_owned(), why })
-        .and_then(|written| publish(&part, path).map(|()| written).map_err(file_error));
-    if written.is_err() {
-        // The message that matters is the first one; what is left of the part is of no use to anybody.
-        let _ = std::fs::remove_file(&part);
-    }
-    written.map(|written| Losses { clamped_negative: image.clamped_negative, clamped_half: written.clamped })
-}
-
-/// The name under which a file is written until it is whole: in the same folder, so that renaming is atomic.
-///
-/// # Errors
-/// `path` names no file.
-pub fn part_path(path: &Path) -> io::Result<PathBuf> {
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"))?;
-    let part = format!(".{}.part-{}", name.to_string_lossy(), std::process::id());
-    Ok(path.with_file_name(part))
-}
-
-/// Gives a whole file its final name: its bytes are on the disk before the name is.
-///
-/// # Errors
-/// The system's.
-pub fn publish(part: &Path, path: &Path) -> io::Result<()> {
-    std::fs::File::open(part)?.sync_all()?;
-    std::fs::rename(part, path)
+    let written = oiio::write(&output).map_err(|why| WriteError::Image { path: path.to_owned(), why })?;
+    draft.publish().map_err(file_error)?;
+    Ok(Losses { clamped_negative: image.clamped_negative, clamped_half: written.clamped })
 }
 
 #[cfg(test)]

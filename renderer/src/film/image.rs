@@ -2,7 +2,7 @@
 
 use super::aov::Shown;
 use super::matte::RANKS;
-use super::{Aov, Film, Layer, Outputs};
+use super::{Aov, Film, FilterMap, Layer, Outputs};
 use crate::math::Rgb;
 
 /// One channel of an image.
@@ -42,7 +42,12 @@ impl Film {
     /// The outputs that there are values for.
     fn known_outputs(&self) -> Outputs {
         let Outputs { aovs, groups } = self.outputs().clone();
-        let known = |aov: &Aov| *aov != Aov::Error || !self.errors.is_empty();
+        let known = |aov: &Aov| match aov {
+            Aov::Error => !self.errors.is_empty(),
+            Aov::FilterBlend => !self.maps[FilterMap::Blend as usize].is_empty(),
+            Aov::FilterCell => !self.maps[FilterMap::Cell as usize].is_empty(),
+            _ => true,
+        };
         Outputs { aovs: aovs.iter().filter(known).collect(), groups }
     }
 
@@ -61,6 +66,10 @@ impl Film {
                 }
                 Shown::Error => {
                     values.extend(self.error(at).to_array());
+                    continue;
+                }
+                Shown::Filter(map) => {
+                    values.push(self.map(*map, at).unwrap_or_default());
                     continue;
                 }
                 Shown::Matte(named) => {

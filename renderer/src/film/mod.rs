@@ -12,7 +12,7 @@ mod matte;
 mod pixel;
 mod sum;
 
-pub use aov::{Aov, AovSet, Layer, Outputs};
+pub use aov::{Aov, AovSet, FilterMap, Layer, Outputs};
 pub use image::{Channel, Image};
 pub use matte::{Matte, Named};
 pub use pixel::{Pixel, Seen, Taken};
@@ -33,6 +33,8 @@ pub const TILE: u32 = 16;
 #[derive(Clone, Debug)]
 pub struct Film {
     resolution: [u32; 2],
+    /// Column and row that are the frame's first.
+    overscan: u32,
     bounds: Bounds,
     outputs: Outputs,
     tiles: [u32; 2],
@@ -48,6 +50,8 @@ pub struct Film {
     mattes: Vec<Matte>,
     /// In the same order: what the filter makes of the pixels, film RGB. Empty until then.
     filtered: Vec<Rgb>,
+    /// In the same order: what the filter tells of the pixels, by [`FilterMap`]. Empty until it does.
+    maps: [Vec<f32>; 2],
     /// In the same order: standard errors of the pixels. Empty until they are known.
     errors: Vec<Rgb>,
 }
@@ -113,19 +117,73 @@ impl Tile<'_> {
     }
 }
 
+impl Tile<'_> {
+    /// Takes what [`Film::store`] appended for the tile's pixels off the front, and adds their samples. `None`, with some of
+    /// them added, where no film has such words.
+    pub fn load(&mut self, words: &mut &[u64]) -> Option<()> {
+        let mut sums = self.sums.chunks_exact_mut(self.layers.len().max(1));
+        let mut mattes = self.mattes.chunks_exact_mut(self.named.len().max(1));
+        for pixel in self.pixels.iter_mut() {
+            pixel.merge(&Pixel::load(words)?);
+            for sum in sums.next().unwrap_or_default() {
+                sum.merge(&Sum::load(words)?);
+            }
+            for matte in mattes.next().unwrap_or_default() {
+                matte.merge(&Matte::load(words)?);
+            }
+        }
+        Some(())
+    }
+}
+
+/// Number of tiles that cover these pixels, along both axes.
+fn tiles(bounds: Bounds) -> [u32; 2] {
+    [bounds.width().div_ceil(TILE), bounds.height().div_ceil(TILE)]
+}
+
+/// Indices of a tile's pixels.
+pub fn tile_slots(tile: usize) -> Range<u32> {
+    const PIXELS: u32 = TILE * TILE;
+    tile as u32 * PIXELS..(tile as u32 + 1) * PIXELS
+}
+
+/// Number of tiles of a film of these pixels.
+pub fn tile_count(bounds: Bounds) -> usize {
+    tiles(bounds).map(|count| count as usize).iter().product()
+}
+
 impl Film {
     /// An empty film of `resolution` of which the pixels in `bounds` are rendered. A `filtered` one keeps what a filter
     /// needs.
     pub fn new(resolution: [u32; 2], bounds: Bounds, outputs: impl Into<Outputs>, filtered: bool) -> Self {
         let outputs = outputs.into();
-        let tiles = [bounds.width().div_ceil(TILE), bounds.height().div_ceil(TILE)];
-        let count = tiles[0] as usize * tiles[1] as usize * (TILE * TILE) as usize;
+        let (tiles, count) = (tiles(bounds), tile_count(bounds) * (TILE * TILE) as usize);
         let layers = outputs.layers(filtered);
         let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
         let named = outputs.mattes();
         let mattes = vec![Matte::default(); count * named.len()];
-        let (filtered, errors) = (Vec::new(), Vec::new());
-        Self { resolution, bounds, outputs, tiles, pixels, layers, sums, named, mattes, filtered, errors }
+        let (filtered, maps, errors) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
+        let overscan = 0;
+        Self {
+            resolution,
+            overscan,
+            bounds,
+            outputs,
+            tiles,
+            pixels,
+            layers,
+            sums,
+            named,
+            mattes,
+            filtered,
+            maps,
+            errors,
+        }
+    }
+
+    /// The same with room for so many pixels around the frame: columns and rows count from there.
+    pub fn with_overscan(self, overscan: u32) -> Self {
+        Self { overscan, ..self }
     }
 
     /// Bytes that a film of this shape holds.
@@ -143,6 +201,11 @@ impl Film {
         self.resolution
     }
 
+    /// Column and row that are the frame's first.
+    pub fn overscan(&self) -> u32 {
+        self.overscan
+    }
+
     /// The pixels that are rendered.
     pub fn bounds(&self) -> Bounds {
         self.bounds
@@ -155,13 +218,7 @@ impl Film {
 
     /// Number of tiles.
     pub fn tile_count(&self) -> usize {
-        self.tiles[0] as usize * self.tiles[1] as usize
-    }
-
-    /// Indices of a tile's pixels.
-    pub fn tile_slots(tile: usize) -> Range<usize> {
-        let pixels = (TILE * TILE) as usize;
-        tile * pixels..(tile + 1) * pixels
+        tile_count(self.bounds)
     }
 
     /// All tiles, each independently mutable.
@@ -222,6 +279,16 @@ impl Film {
         }
     }
 
+    /// Sets what the filter tells of pixels, by their indices.
+    pub fn set_map(&mut self, map: FilterMap, values: Vec<f32>) {
+        self.maps[map as usize] = values;
+    }
+
+    /// What the filter tells of the pixel at `[x, y]`, if it did.
+    pub fn map(&self, map: FilterMap, at: [u32; 2]) -> Option<f32> {
+        self.maps[map as usize].get(self.index(at)).copied()
+    }
+
     /// Value of the pixel at `[x, y]`, film RGB: filtered if the frame is.
     pub fn value(&self, at: [u32; 2]) -> glam::DVec3 {
         self.filtered.get(self.index(at)).map_or_else(|| self.pixel(at).mean(), |value| value.as_dvec3())
@@ -246,11 +313,11 @@ impl Film {
         self.errors.get(self.index(at)).copied().unwrap_or(Rgb::ZERO)
     }
 
-    /// Bytes that a film of this shape is stored as, without names.
-    pub fn stored_bytes(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
+    /// Words that a film of this shape is stored as, without names.
+    pub fn stored_words(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
-        pixels * 8 * (Pixel::WORDS + outputs.layers(filtered).len() * Sum::<3>::WORDS + outputs.mattes().len()) as u64
+        pixels * (Pixel::WORDS + outputs.layers(filtered).len() * Sum::<3>::WORDS + outputs.mattes().len()) as u64
     }
 
     /// Appends the words of the pixels `range`, by their indices, to be stored.
@@ -261,22 +328,6 @@ impl Film {
             self.sums[index * layers..(index + 1) * layers].iter().for_each(|sum| sum.store(words));
             self.mattes[index * named..(index + 1) * named].iter().for_each(|matte| matte.store(words));
         }
-    }
-
-    /// Takes what [`Self::store`] appended for the pixels `range` off the front, and adds their samples. `None`, with some of
-    /// them added, where no film has such words.
-    pub fn load(&mut self, range: Range<usize>, words: &mut &[u64]) -> Option<()> {
-        let (layers, named) = (self.layers.len(), self.named.len());
-        for index in range {
-            self.pixels.get_mut(index)?.merge(&Pixel::load(words)?);
-            for sum in &mut self.sums[index * layers..(index + 1) * layers] {
-                sum.merge(&Sum::load(words)?);
-            }
-            for matte in &mut self.mattes[index * named..(index + 1) * named] {
-                matte.merge(&Matte::load(words)?);
-            }
-        }
-        Some(())
     }
 
     /// One past the largest index of a pixel.
@@ -348,9 +399,13 @@ mod tests {
             words
         };
         let whole = words(&film(0..9));
+        let load = |film: &mut Film, words: &[u64]| {
+            let mut words = words;
+            film.tiles().iter_mut().try_for_each(|tile| tile.load(&mut words))
+        };
         let mut sum = film(4..9);
-        sum.load(0..sum.slots(), &mut &words(&film(0..4))[..]).unwrap();
+        load(&mut sum, &words(&film(0..4))).unwrap();
         assert!(words(&sum) == whole);
-        assert_eq!(film(0..1).load(0..sum.slots(), &mut &whole[1..]), None);
+        assert_eq!(load(&mut film(0..1), &whole[1..]), None);
     }
 }

@@ -94,8 +94,8 @@ impl Pixel {
 }
 
 impl Frame {
-    /// The blended image.
-    pub fn blend(&self, settings: &Blend) -> Vec<Rgb> {
+    /// The blended image, and the share of the unfiltered one in each pixel.
+    pub fn blend(&self, settings: &Blend) -> (Vec<Rgb>, Vec<f32>) {
         let sum: f64 = self.pixels.iter().map(|pixel| f64::from(luminance(pixel.own))).sum();
         let mean = (sum / self.pixels.len().max(1) as f64) as f32;
         // Errors count relative to brightness, as eyes see them, down to a tenth of the mean. The brightness is that of nine
@@ -118,7 +118,7 @@ impl Frame {
         let blended = (&self.pixels, &filtered, &whole)
             .into_par_iter()
             .map(|(pixel, filtered, w)| *filtered + *w * (pixel.own - *filtered));
-        blended.collect()
+        (blended.collect(), whole)
     }
 }
 

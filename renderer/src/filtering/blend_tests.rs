@@ -28,7 +28,7 @@ fn frame(sigma: f32, halves: bool, bias: impl Fn(usize, usize) -> f32) -> Frame 
 
 /// Mean squared error of the blend over all pixels.
 fn error(frame: &Frame) -> f32 {
-    let values = frame.blend(&Blend::default());
+    let (values, _) = frame.blend(&Blend::default());
     values.iter().map(|value| (value.x - 1.0).powi(2)).sum::<f32>() / values.len() as f32
 }
 
@@ -55,7 +55,7 @@ fn an_error_of_one_pixel_is_found_once_the_noise_is_below_it() {
     // A window's mean of one error among many scatters as much as it is large: only the noise tells it is no chance.
     let lone = |x: usize, y: usize| if x % 32 == 16 && y % 32 == 16 { 0.5 } else { 0.0 };
     let at = 16 * SIDE + 16;
-    let off = |sigma: f32| (frame(sigma, true, lone).blend(&Blend::default())[at].x - 1.0).abs();
+    let off = |sigma: f32| (frame(sigma, true, lone).blend(&Blend::default()).0[at].x - 1.0).abs();
     assert!(off(1e-3) < 0.01 && off(1e-4) < 1e-3, "{} {}", off(1e-3), off(1e-4));
 }
 
@@ -92,7 +92,7 @@ fn a_firefly_is_not_taken_for_the_filters_error() {
     // In one half of the samples, as any single path is.
     frame.pixels[at].own += 500.0;
     *frame.pixels[at].own_noise.as_mut().unwrap() += 500.0;
-    let value = frame.blend(&Blend::default())[at].x;
+    let value = frame.blend(&Blend::default()).0[at].x;
     assert!((value - 1.0).abs() < 0.05, "{value}");
 }
 

@@ -127,6 +127,8 @@ pub enum CameraKind {
 pub struct Film {
     /// Width and height in pixels.
     pub resolution: [u32; 2],
+    /// Pixels rendered around the image on every side.
+    pub overscan: u32,
     /// Fraction of the image rendered, x0 x1 y0 y1 in [0, 1], y down.
     pub crop_window: Option<[f32; 4]>,
     /// Pixels rendered, x0 x1 y0 y1, upper ends exclusive. Wins over the crop window.

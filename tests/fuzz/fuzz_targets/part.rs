@@ -37,10 +37,11 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         return;
     }
     let Ok(mut frame) = part.begin() else { return };
-    part::write(&mut frame, written).expect("what was read can be written");
+    let write = |frame: &mut _| part::write(frame, written).and_then(|part| part.publish(written));
+    write(&mut frame).expect("what was read can be written");
     let once = std::fs::read(written).expect("it was written");
     let mut frame = Part::open(written).and_then(Part::begin).expect("what was written can be read");
-    part::write(&mut frame, written).expect("what was read can be written");
+    write(&mut frame).expect("what was read can be written");
     assert!(std::fs::read(written).expect("it was written") == once);
     frame.finish();
 });

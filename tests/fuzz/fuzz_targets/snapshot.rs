@@ -1,19 +1,30 @@
-//! Any words are sums of a filter's part, which are then stored as they add up, or refused.
+//! Any words are a part's share of a tree, which is then stored as it adds up, or refused; or sums of its slots.
 #![no_main]
 
-use filter::{Adaptive, Anchor, Params};
+use filter::{Adaptive, Anchor, Branch, Params, Slots};
 
 const ANCHOR: Anchor = Anchor { origin: glam::DVec3::ZERO, extent: 1.0 };
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let words: Vec<u64> = bytes.chunks_exact(8).map(|chunk| u64::from_le_bytes(chunk.try_into().unwrap())).collect();
-    let filter = || Adaptive::new(&Params { trees: 1, ..Params::default() }, &ANCHOR, 1);
-    let (mut read, mut again) = (filter(), filter());
-    if read.load_part(0, 0..256, &words).is_ok() {
-        let (mut once, mut twice) = (Vec::new(), Vec::new());
-        read.store_part(0, &mut once);
-        again.load_part(0, 0..256, &once).expect("what was stored");
-        again.store_part(0, &mut twice);
-        assert_eq!(once, twice);
+    let (params, slots) = (Params { trees: 1, ..Params::default() }, 0..256);
+    if let Ok(branch) = Branch::read(&params, 0, &slots, &words) {
+        let stored = |branch: &Branch| {
+            let mut filter = Adaptive::new(&params, &ANCHOR, 1);
+            filter.add_tree(0, 0, branch);
+            filter.settle();
+            let mut words = Vec::new();
+            filter.store_tree(0, 0, &slots, &mut words);
+            words
+        };
+        let once = stored(&branch);
+        let again = Branch::read(&params, 0, &slots, &once).expect("what was stored");
+        assert_eq!(once, stored(&again));
+        Branch::sum(vec![branch, again]);
+    }
+    if let Ok(own) = Slots::read(&slots, &words) {
+        let mut again = Vec::new();
+        own.store(&slots, &mut again);
+        assert_eq!(words, again);
     }
 });

@@ -112,7 +112,8 @@ fn render(sequence: &Sequence<'_>, chunk: u32) -> String {
         slice: "{{Task.Param.Slice}}",
         progress: "openjd",
     };
-    let words = [sequence.render(&task), sequence.arguments.options.clone()].concat();
+    let map = ["--path-map", "{{Session.PathMappingRulesFile}}"].map(str::to_owned);
+    let words = [sequence.render(&task), map.into(), sequence.arguments.options.clone()].concat();
     let slices = format!(
         "        - name: Slice
           type: INT

@@ -120,16 +120,23 @@ fn submit(sequence: &Sequence<'_>, images: &str, folder: &str) -> String {
     format!(
         "\
 #!/bin/bash
-# Hands the frames to Slurm: each an array of slices, and a merge that waits for them. Arguments are given to sbatch. Run
-# again, it renders only what is missing; FRAMES=\"3 7\" names frames other than all.
+# Hands the frames to Slurm: each an array of slices, the same array once more if a slice fails, and a merge that waits for
+# either. What is done is skipped and what was begun is gone on with, so a second try costs what the first one lost; where
+# there is nothing to try again, Slurm drops it. Arguments are given to sbatch. Run again, it renders only what is missing;
+# FRAMES=\"3 7\" names frames other than all.
 set -euo pipefail
 folder={folder}
 mkdir -p -- \"$folder/logs\" \"$folder/parts\" {images}
+hand_over() {{
+    local job
+    job=$(sbatch --parsable --chdir=\"$folder\" --kill-on-invalid-dep=yes \"$@\")
+    echo \"${{job%%;*}}\"
+}}
 for frame in ${{FRAMES:-{frames}}}; do
-    slices=$(sbatch --parsable --chdir=\"$folder\" --array=0-{last} \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
-    merge=$(sbatch --parsable --chdir=\"$folder\" --dependency=\"afterok:${{slices%%;*}}\" --kill-on-invalid-dep=yes \"$@\" \\
-        -- \"$folder/merge.sbatch\" \"$frame\")
-    echo \"frame $frame: slices are job ${{slices%%;*}}, the merge is job ${{merge%%;*}}\"
+    first=$(hand_over --array=0-{last} \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
+    again=$(hand_over --array=0-{last} --dependency=\"afternotok:$first\" \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
+    merge=$(hand_over --dependency=\"afterok:$first?afterok:$again\" \"$@\" -- \"$folder/merge.sbatch\" \"$frame\")
+    echo \"frame $frame: slices are job $first, and $again if one fails; the merge is job $merge\"
 done
 ",
         folder = quoted(folder),
@@ -239,7 +246,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let bin = folder.path().join("bin");
         fs::create_dir(&bin).unwrap();
-        let sbatch = "#!/bin/sh\nprintf '<%s>' \"$@\" >> \"$0.calls\"\necho >> \"$0.calls\"\necho \"41;cluster\"\n";
+        let sbatch = "#!/bin/sh\nprintf '<%s>' \"$@\" >> \"$0.calls\"\necho >> \"$0.calls\"\n\
+                      echo \"$((40 + $(wc -l < \"$0.calls\")));cluster\"\n";
         fs::write(bin.join("sbatch"), sbatch).unwrap();
         fs::set_permissions(bin.join("sbatch"), fs::Permissions::from_mode(0o755)).unwrap();
         let job = folder.path().join("the job");
@@ -250,13 +258,17 @@ mod tests {
         fs::write(&script, scripts(&words, Path::new(job)).submit).unwrap();
         let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
         let ran = Command::new("bash").arg(&script).arg("--time=1").env("PATH", path).output().unwrap();
-        assert_eq!(String::from_utf8(ran.stdout).unwrap(), "frame 5: slices are job 41, the merge is job 41\n");
+        assert_eq!(
+            String::from_utf8(ran.stdout).unwrap(),
+            "frame 5: slices are job 41, and 42 if one fails; the merge is job 43\n"
+        );
+        let always = format!("<--parsable><--chdir={job}><--kill-on-invalid-dep=yes>");
         assert_eq!(
             fs::read_to_string(bin.join("sbatch.calls")).unwrap(),
             format!(
-                "<--parsable><--chdir={job}><--array=0-1><--time=1><--><{job}/render.sbatch><5>\n\
-                 <--parsable><--chdir={job}><--dependency=afterok:41><--kill-on-invalid-dep=yes><--time=1><-->\
-                 <{job}/merge.sbatch><5>\n"
+                "{always}<--array=0-1><--time=1><--><{job}/render.sbatch><5>\n\
+                 {always}<--array=0-1><--dependency=afternotok:41><--time=1><--><{job}/render.sbatch><5>\n\
+                 {always}<--dependency=afterok:41?afterok:42><--time=1><--><{job}/merge.sbatch><5>\n"
             )
         );
         assert!(output.parent().unwrap().is_dir() && Path::new(job).join("logs").is_dir());

@@ -27,6 +27,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Object>, instances: Vec<Instance>) -> 
         },
         film: Film {
             resolution: [1, 1],
+            overscan: 0,
             crop_window: None,
             pixel_bounds: None,
             filename: None,

@@ -7,8 +7,8 @@ use super::report::{Report, did_you_mean, shown};
 use super::source::Files;
 use super::spectra;
 use super::textures::{self, TextureTable, TextureValues};
-use crate::scene::Span;
 use crate::scene::description::TextureId;
+use crate::scene::{PathMap, Span};
 use crate::spectrum::{self, Spectrum};
 
 /// Types of version 3 of the format, by what they are of, and the nearest type of version 4.
@@ -84,10 +84,10 @@ pub(super) struct Context {
 }
 
 impl Context {
-    pub(super) fn new(folder: PathBuf) -> Self {
+    pub(super) fn new(folder: PathBuf, map: PathMap) -> Self {
         Self {
             report: Report::default(),
-            files: Files { folder, ..Files::default() },
+            files: Files { folder, map, ..Files::default() },
             textures: TextureNames::Said(Names::default()),
             spectra: HashMap::new(),
         }

@@ -48,6 +48,7 @@ pub(super) fn build(cx: &mut Context, params: &mut Params, space: RgbSpace, expo
             params.int(cx, "xresolution", 1280, 1..=LARGEST_SIDE),
             params.int(cx, "yresolution", 720, 1..=LARGEST_SIDE),
         ],
+        overscan: 0,
         crop_window: crop_window(cx, params),
         pixel_bounds: pixel_bounds(cx, params),
         filename: params.string(cx, "filename").filter(|name| !name.is_empty()).map(PathBuf::from),

@@ -36,7 +36,7 @@ mod world;
 
 use std::path::Path;
 
-use super::{Diagnostic, Scene, Severity};
+use super::{Diagnostic, PathMap, Scene, Severity};
 
 /// The scene with the warnings about it.
 pub type Loaded = (Scene, Vec<Diagnostic>);
@@ -48,12 +48,20 @@ pub type Loaded = (Scene, Vec<Diagnostic>);
 /// # Errors
 /// All errors and warnings, in the order of the files and lines.
 pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
+    load_mapped(path, &PathMap::default())
+}
+
+/// The same, with the files that the scene names where `map` says.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_mapped(path: &Path, map: &PathMap) -> Result<Loaded, Vec<Diagnostic>> {
     let text = source::read_file(path).map_err(|why| {
         let message = format!("cannot read {}: {why}", path.display());
         vec![Diagnostic { severity: Severity::Error, message, place: None }]
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut reader = reader::Reader::new(folder.to_owned());
+    let mut reader = reader::Reader::new(folder.to_owned(), map.clone());
     reader.read(path, text);
     finish::finish(reader)
 }
@@ -63,7 +71,7 @@ pub fn load(path: &Path) -> Result<Loaded, Vec<Diagnostic>> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &[u8], folder: &Path, name: &str) -> Result<Loaded, Vec<Diagnostic>> {
-    let mut reader = reader::Reader::new(folder.to_owned());
+    let mut reader = reader::Reader::new(folder.to_owned(), PathMap::default());
     reader.read(&folder.join(name), text.to_vec());
     finish::finish(reader)
 }

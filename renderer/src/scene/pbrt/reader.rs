@@ -14,7 +14,7 @@ use super::state::{self, CoordinateSystems, State, Transforms};
 use super::syntax::{Directive, read_directive};
 use super::world::{InstanceEntity, ObjectEntity, World};
 use crate::math::Transform;
-use crate::scene::Span;
+use crate::scene::{PathMap, Span};
 use crate::spectrum::RgbSpace;
 
 /// Files within files beyond this include themselves or are not meant to be read.
@@ -51,9 +51,9 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    pub(super) fn new(folder: PathBuf) -> Self {
+    pub(super) fn new(folder: PathBuf, map: PathMap) -> Self {
         Self {
-            cx: Context::new(folder),
+            cx: Context::new(folder, map),
             options: Options::default(),
             world: World::default(),
             in_world: false,

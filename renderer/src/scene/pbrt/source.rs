@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::lexer::{Kind, Lexer, NotANumber, Token, parse_f64};
 use super::report::{Report, shown};
 use super::syntax::DIRECTIVES;
-use crate::scene::{SourceMap, Span};
+use crate::scene::{PathMap, SourceMap, Span};
 
 /// Something was wrong and has been reported: go on with the next directive.
 #[derive(Debug)]
@@ -41,6 +41,8 @@ pub(super) struct Files {
     pub(super) sources: SourceMap,
     /// Folder of the scene file: paths in a scene are relative to it.
     pub(super) folder: PathBuf,
+    /// Where files are that the scene has elsewhere.
+    pub(super) map: PathMap,
 }
 
 impl Files {
@@ -59,9 +61,10 @@ impl Files {
     /// The path that `name` in file `file` means: relative to the folder of the scene, as pbrt has it, or else relative
     /// to the file that says it.
     pub(super) fn resolve(&self, name: &str, file: u32) -> PathBuf {
-        let by_scene = self.folder.join(name);
-        if Path::new(name).is_relative() && !by_scene.exists() {
-            if let Some(by_file) = self.sources.path(file).parent().map(|folder| folder.join(name)) {
+        let name = self.map.apply(name);
+        let by_scene = self.folder.join(&name);
+        if name.is_relative() && !by_scene.exists() {
+            if let Some(by_file) = self.sources.path(file).parent().map(|folder| folder.join(&name)) {
                 if by_file.exists() {
                     return by_file;
                 }

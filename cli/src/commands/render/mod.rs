@@ -1,0 +1,222 @@
+//! `tessera render`: from a scene file to an image file.
+
+mod outcome;
+mod reporter;
+
+use std::iter;
+use std::path::Path;
+use std::sync::atomic::AtomicU64;
+use std::time::Instant;
+
+use rayon::ThreadPool;
+use renderer::error::{Goal, Watch};
+use renderer::film::exr::{self, Losses};
+use renderer::film::{Aov, AovSet};
+use renderer::filtering::Filtering;
+use renderer::frame::{FrameDescription, Samples};
+use renderer::part::{self, Part};
+use renderer::render::{self, Job, Traced};
+
+use self::outcome::{Outcome, Written};
+use self::reporter::{MemoryLimit, Reporter};
+use crate::args::RenderArguments;
+use crate::checkpoint::Checkpoints;
+use crate::exit::Failure;
+use crate::interrupt::Interrupt;
+use crate::job;
+use crate::log::Log;
+use crate::metadata;
+use crate::output::OutputFile;
+use crate::progress::Progress;
+use crate::stats;
+
+/// Runs the command.
+pub fn run(arguments: &RenderArguments, log: &Log) -> Result<(), Failure> {
+    let frames: Vec<_> = match &arguments.frames {
+        Some(frames) => frames.numbers().iter().copied().map(Some).collect(),
+        None => vec![arguments.frame],
+    };
+    let progress = Progress::new(arguments.run.progress, frames.len(), log);
+    sequence(arguments, &frames, log, &progress).inspect_err(|failure| progress.fail(failure))
+}
+
+/// Frames one after the other, each as if it were alone.
+fn sequence(
+    arguments: &RenderArguments,
+    frames: &[Option<i32>],
+    log: &Log,
+    progress: &Progress<'_>,
+) -> Result<(), Failure> {
+    if let Some(frames) = &arguments.frames {
+        let outputs = iter::once(&arguments.output).chain(&arguments.channels.stats);
+        outputs.into_iter().try_for_each(|output| job::distinct(output, frames.numbers()))?;
+    }
+    let interrupt = Interrupt::default();
+    if let Err(why) = interrupt.listen() {
+        log.warning(&format!("signals will end the render without an image: {why}"));
+    }
+    for &frame in frames {
+        if interrupt.requested() {
+            return Err(Failure::Interrupted("interrupted between two frames".into()));
+        }
+        let mut arguments = arguments.clone();
+        arguments.frame = frame;
+        arguments.scene = frame.map_or(arguments.scene.clone(), |frame| job::named(&arguments.scene, frame));
+        render(&arguments, log, progress, &interrupt)?;
+    }
+    Ok(())
+}
+
+fn render(
+    arguments: &RenderArguments,
+    log: &Log,
+    progress: &Progress<'_>,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let begin = Instant::now();
+    job::check_samples(arguments)?;
+    job::check_outputs(arguments)?;
+    let filtering = job::filtering(&arguments.filter)?;
+    let path = job::output(arguments)?;
+    let named = |path: &Path| job::named(path, arguments.frame.unwrap_or(1));
+    let checkpoint = arguments.checkpoint.checkpoint.as_deref().map(named);
+    if job::is_part(&path) || checkpoint.is_some() {
+        part::storable(&filtering).map_err(|error| Failure::Usage(error.to_string()))?;
+    }
+    let encoding = job::encoding(&arguments.channels.encoding);
+    let output = OutputFile::prepare(&path)?;
+    let stats_file = arguments.channels.stats.as_deref().map(|path| OutputFile::prepare(&named(path))).transpose()?;
+    let checkpoints = Checkpoints::new(&arguments.checkpoint, checkpoint, log)?;
+
+    let job = job(arguments, filtering);
+    log.verbose(&format!("{}, OpenImageIO {}, {} threads", job::software(), oiio::version(), job.threads));
+    let reporter = Reporter {
+        log,
+        progress,
+        warnings: AtomicU64::new(0),
+        interrupt,
+        checkpoints,
+        memory: MemoryLimit::new(arguments.run.memory_limit),
+        output: &output,
+        watch: watch(arguments, &job),
+        encoding: &encoding,
+    };
+    let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
+    let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
+    job::check_encoding(&encoding, prepared.description.aovs)?;
+    if arguments.checkpoint.skip_existing && is_complete(&path, &prepared.description) {
+        log.info(&format!("{} is there and complete: nothing to do", path.display()));
+        progress.finish(&path, stats::peak_memory());
+        return Ok(());
+    }
+    render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
+    reporter.memory.check(render::least_memory(&prepared))?;
+    let begun = reporter.checkpoints.begin(&prepared.description)?;
+    let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
+    let stopped = reporter.hindered() && !traced.frame.complete();
+    if stopped {
+        pool.install(|| reporter.checkpoints.write(&mut traced.frame));
+    }
+
+    progress.phase("write");
+    let start = Instant::now();
+    let written = if job::is_part(&path) {
+        write_part(traced, &pool, &output)?
+    } else {
+        write_image(traced, &pool, &reporter, arguments.channels.provenance)?
+    };
+    let outcome = Outcome { path: &path, written, begin, write_seconds: start.elapsed().as_secs_f64() };
+    let stats = outcome.stats(arguments, &reporter);
+    if let Some(file) = stats_file {
+        let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
+        file.write((text + "\n").as_bytes())?;
+    }
+    if stopped {
+        outcome::tell(&stats, &outcome.written.frame, log);
+        return Err(reporter.hindrance());
+    }
+    if stats.complete {
+        reporter.checkpoints.clear();
+    }
+    progress.finish(&path, stats.memory.peak_resident_bytes);
+    outcome::tell(&stats, &outcome.written.frame, log);
+    outcome::judge(arguments, &stats)
+}
+
+/// Writes the sums.
+fn write_part(mut traced: Traced, pool: &ThreadPool, output: &OutputFile) -> Result<Written, Failure> {
+    let written = pool.install(|| part::write(&mut traced.frame, output.target()));
+    let published = written.and_then(|written| written.publish(output.target()));
+    published.map_err(|error| Failure::Output(error.to_string()))?;
+    Ok(Written { frame: traced.undeveloped(), losses: Losses::default(), error: None })
+}
+
+/// Writes the image.
+fn write_image(
+    traced: Traced,
+    pool: &ThreadPool,
+    reporter: &Reporter<'_>,
+    provenance: bool,
+) -> Result<Written, Failure> {
+    // The renderer allows OpenImageIO no threads beside its own; the file at the end may have all.
+    if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
+        reporter.log.verbose(&format!("{error}; its default stays"));
+    }
+    let mut frame = pool.install(|| traced.develop());
+    let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
+    let attributes = metadata::of_frame(&frame, error.as_ref(), provenance);
+    let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
+        .map_err(|error| Failure::Output(error.to_string()))?;
+    Ok(Written { frame, losses, error })
+}
+
+/// Whether there is an image or a part of this very frame that lacks no sample of those that are asked for.
+fn is_complete(path: &Path, description: &FrameDescription) -> bool {
+    let samples = Samples::from(description.asked.clone());
+    if job::is_part(path) {
+        return Part::open(path)
+            .is_ok_and(|part| part.samples == samples && description.difference(&part.description).is_none());
+    }
+    let same = |image: oiio::Image| {
+        metadata::identity(description, &samples).iter().all(|(name, value)| image.attribute(name) == Some(value))
+    };
+    oiio::read(path).is_ok_and(same)
+}
+
+fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
+    let mut aovs = AovSet::default();
+    for name in &arguments.channels.aov {
+        if name == "all" {
+            aovs = AovSet::all();
+        } else {
+            aovs.insert(name);
+        }
+    }
+    Job {
+        scene: arguments.scene.clone(),
+        path_map: arguments.paths.map(),
+        spp: arguments.quality.spp,
+        seed: arguments.quality.seed,
+        frame: arguments.frame,
+        lock_seed: arguments.quality.lock_seed,
+        resolution: arguments.frame_area.resolution.map(|size| size.0),
+        overscan: arguments.frame_area.overscan,
+        crop: arguments.frame_area.crop,
+        pixel_bounds: arguments.frame_area.pixel_bounds,
+        sample_range: arguments.quality.sample_range.clone(),
+        slice: arguments.quality.slice,
+        threads: job::threads(arguments.run.threads, job::slurm().as_deref()),
+        aovs,
+        time_limit: arguments.quality.time_limit,
+        filtering,
+        ..Job::default()
+    }
+}
+
+/// Who looks at the frame's error. It costs nothing but where there is a filter, which then is evaluated when the number of
+/// samples doubles: only if somebody asks.
+fn watch(arguments: &RenderArguments, job: &Job) -> Option<Watch> {
+    let goal = Goal { relmse: arguments.quality.target_error, noise: arguments.quality.noise_threshold };
+    let asked = job.aovs.contains(Aov::Error) || goal != Goal::default();
+    (asked || job.filtering == Filtering::None).then(|| Watch::new(goal))
+}

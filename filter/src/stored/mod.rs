@@ -1,0 +1,244 @@
+//! All that a filter holds between blocks, as words: to be stored, sent, and added to another filter's.
+//!
+//! Everything is a sum of integers, so adding is exact: any split of a frame's epochs over filters, added in any order,
+//! resolves to the same bits as one filter that saw them all. What is written does not depend on who met a cell first.
+//!
+//! Sums are stored tree by tree, and of each tree part by part: a [`Branch`]. What slots sum up without a cell comes last,
+//! part by part: [`Slots`]. In that order files of many filters can be read side by side and resolved by [`Merging`], which
+//! holds the cells of one tree at a time.
+
+mod branch;
+mod merging;
+mod slots;
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+pub use branch::Branch;
+pub use merging::Merging;
+pub use slots::Slots;
+
+use crate::adaptive::{Adaptive, Params};
+use crate::grid::CellKey;
+use crate::sums::WideSums;
+use crate::table::{Key, Table};
+
+/// These words are not the sums of such a filter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoredError;
+
+impl std::fmt::Display for StoredError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "these are not the sums of a filter with these settings")
+    }
+}
+
+impl std::error::Error for StoredError {}
+
+impl Params {
+    /// Number of trees of cells at first vertices: those of diffuse lobes, then those of glossy ones.
+    pub fn stored_trees(&self) -> usize {
+        2 * self.trees as usize
+    }
+}
+
+impl Adaptive {
+    /// As [`Params::stored_trees`].
+    pub fn stored_trees(&self) -> usize {
+        self.params.stored_trees()
+    }
+
+    /// Orders what the last blocks have left, as [`Self::store_tree`] wants it.
+    pub fn settle(&mut self) {
+        self.parts.par_iter_mut().for_each(|part| part.pairs.settle());
+    }
+
+    /// Appends a part's share of a tree, after [`Self::settle`]. The part has `slots`.
+    ///
+    /// # Panics
+    /// If there is no such part, or no such tree.
+    pub fn store_tree(&self, tree: usize, part: usize, slots: &Range<u32>, words: &mut Vec<u64>) {
+        let part = &self.parts[part];
+        let trees = part.cells[0].len();
+        let numbers = store_cells(&part.cells[tree / trees][tree % trees], words);
+        let of_tree = part.pairs.settled().iter().filter(|pair| pair.tree_of(2 * trees) == tree);
+        let mut pairs: Vec<_> = of_tree.map(|pair| pair.with_cell(numbers[pair.index()])).collect();
+        for same in pairs.chunk_by_mut(|a, b| a.slot() == b.slot()) {
+            same.sort_unstable_by_key(|pair| pair.index());
+        }
+        branch::store_pairs(&pairs, slots, words);
+    }
+
+    /// Adds what [`Self::store_tree`] appended for this part of another filter over the same frame.
+    ///
+    /// # Panics
+    /// If there is no such part, or no such tree.
+    pub fn add_tree(&mut self, tree: usize, part: usize, branch: &Branch) {
+        let part = &mut self.parts[part];
+        let trees = part.cells[0].len();
+        let table = &mut part.cells[tree / trees][tree % trees];
+        let add = |(key, sums): &(CellKey, WideSums)| {
+            let cell = table.cell((*key).into());
+            table.merge(cell, sums);
+            cell
+        };
+        let numbers: Vec<u32> = branch.cells.iter().map(add).collect();
+        part.pairs.absorb(branch.pairs.iter().map(|pair| pair.with_cell(numbers[pair.index()])));
+        self.cells_changed();
+    }
+
+    /// Reads what [`Self::store_tree`] appended for this part of another filter, and adds it.
+    ///
+    /// # Errors
+    /// There is no such share of a tree.
+    ///
+    /// # Panics
+    /// If there is no such part, or no such tree.
+    pub fn load_tree(
+        &mut self,
+        tree: usize,
+        part: usize,
+        slots: &Range<u32>,
+        words: &[u64],
+    ) -> Result<(), StoredError> {
+        self.add_tree(tree, part, &Branch::read(&self.params, tree, slots, words)?);
+        Ok(())
+    }
+
+    /// Appends what a part's slots sum up without a cell.
+    ///
+    /// # Panics
+    /// If there is no such part.
+    pub fn store_slots(&self, part: usize, slots: &Range<u32>, words: &mut Vec<u64>) {
+        slots::store(self.parts[part].pairs.own_sums(), slots, words);
+    }
+
+    /// Adds what [`Self::store_slots`] appended for this part of another filter over the same frame.
+    ///
+    /// # Panics
+    /// If there is no such part.
+    pub fn add_slots(&mut self, part: usize, slots: &Slots) {
+        self.parts[part].pairs.absorb_own(&slots.0);
+    }
+
+    /// Appends what second vertices share so far in the current epoch.
+    pub fn store_epoch(&self, words: &mut Vec<u64>) {
+        for tree in &self.second {
+            tree.cells.tables().iter().for_each(|table| {
+                store_cells(table, words);
+            });
+        }
+    }
+
+    /// Goes on in the epoch of `next`, the next sample of the slots, with what [`Self::store_epoch`] appended.
+    ///
+    /// # Errors
+    /// There are no such sums; some of them may have been added.
+    pub fn load_epoch(&mut self, next: u64, words: &[u64]) -> Result<(), StoredError> {
+        self.begin_block(next);
+        let mut words = Words(words);
+        for tree in &self.second {
+            for mut table in tree.cells.tables() {
+                for (key, sums) in load_cells(&mut words)? {
+                    let cell = table.cell(key);
+                    table.merge(cell, &sums);
+                }
+            }
+        }
+        words.end()
+    }
+
+    /// Paths so far, and those of them that no cell could take.
+    pub fn paths(&self) -> [u64; 2] {
+        [self.report.paths, self.report.unfiltered]
+    }
+
+    /// Adds the counts of another filter.
+    pub fn add_paths(&mut self, [paths, unfiltered]: [u64; 2]) {
+        self.report.paths = self.report.paths.saturating_add(paths);
+        self.report.unfiltered = self.report.unfiltered.saturating_add(unfiltered);
+    }
+}
+
+/// Appends a table's cells by key; their numbers in that order, by their numbers in the table.
+fn store_cells<K: Key>(table: &Table<K>, words: &mut Vec<u64>) -> Vec<u32> {
+    let mut order: Vec<(CellKey, u32)> = table.keys().zip(0..).collect();
+    order.sort_unstable();
+    let mut numbers = vec![0; order.len()];
+    for ((_, cell), number) in order.iter().zip(0..) {
+        numbers[*cell as usize] = number;
+    }
+    branch::store_cells(order.into_iter().map(|(key, cell)| (key, table.sums(cell))), words);
+    numbers
+}
+
+/// Reads what [`store_cells`] appended: by key, each once.
+fn load_cells(words: &mut Words<'_>) -> Result<Vec<(CellKey, WideSums)>, StoredError> {
+    let count = words.count(8)?;
+    let mut cells = Vec::with_capacity(count);
+    let mut last = 0;
+    for _ in 0..count {
+        let [low, high, count, weight] = words.take()?;
+        let [r, g, b, square] = if count & 1 == 0 {
+            words.take::<4>()?.map(u128::from)
+        } else {
+            let halves = words.take::<8>()?;
+            std::array::from_fn(|i| join(halves[2 * i], halves[2 * i + 1]))
+        };
+        // No cell has only zeros for its key, so a step of 0 is never right.
+        let step = Some(join(low, high)).filter(|step| *step > 0).ok_or(StoredError)?;
+        last = step.checked_add(last).ok_or(StoredError)?;
+        let key = CellKey::from_bits(last).ok_or(StoredError)?;
+        cells.push((key, WideSums { count: count >> 1, weight, rgb: [r, g, b], square }));
+    }
+    Ok(cells)
+}
+
+fn split(x: u128) -> [u64; 2] {
+    [x as u64, (x >> 64) as u64]
+}
+
+fn join(low: u64, high: u64) -> u128 {
+    u128::from(low) | u128::from(high) << 64
+}
+
+/// Takes words off the front.
+struct Words<'a>(&'a [u64]);
+
+impl Words<'_> {
+    fn take<const N: usize>(&mut self) -> Result<[u64; N], StoredError> {
+        let (first, rest) = self.0.split_first_chunk::<N>().ok_or(StoredError)?;
+        self.0 = rest;
+        Ok(*first)
+    }
+
+    /// A number of items of at least `size` words, so that no count asks for more than there is.
+    fn count(&mut self, size: usize) -> Result<usize, StoredError> {
+        let [count] = self.take()?;
+        usize::try_from(count).ok().filter(|count| *count <= self.0.len() / size).ok_or(StoredError)
+    }
+
+    fn end(&self) -> Result<(), StoredError> {
+        if self.0.is_empty() { Ok(()) } else { Err(StoredError) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Found by fuzzing: the counts of one cell, stored twice, added up to more than a count that is stored can be.
+    #[test]
+    fn a_cell_comes_once() {
+        const KEY: u64 = 0x4c4c_4c4c_4c4c_4c4c;
+        let sums = [2, 1, 0, 0, 0, 0];
+        let cells = |steps: &[[u64; 2]]| {
+            let cells = steps.iter().flat_map(|step| [&step[..], &sums].concat());
+            load_cells(&mut Words(&[steps.len() as u64].into_iter().chain(cells).collect::<Vec<_>>()))
+        };
+        assert_eq!(cells(&[[KEY; 2], [1, 0]]).map(|cells| cells.len()), Ok(2));
+        assert_eq!(cells(&[[KEY; 2], [0, 0]]), Err(StoredError));
+        assert_eq!(cells(&[[KEY; 2], [u64::MAX; 2]]), Err(StoredError));
+    }
+}

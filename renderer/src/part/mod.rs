@@ -1,0 +1,140 @@
+//! Parts: frames in the making as files, to be added to others or gone on with. `docs/parts.md` has the format in full.
+//!
+//! | what | |
+//! |---|---|
+//! | 8 bytes | `TSRpart` and the version of this format |
+//! | a section | header: JSON, UTF-8 |
+//! | for each tree of the filter: a section a tile | its cells, and which pixels read them (`FrameFilter::store_tree`) |
+//! | a section a tile | the sums of the tile's pixels (`Film::store`), then those that the filter keeps of them |
+//! | a section | what the filter shares within an epoch that is not over; none between epochs |
+//!
+//! Sections but the header are words: see [`section`]. Everything that is added is an integer, so any order of additions
+//! gives the same bits, and what is written depends on neither the machine nor the number of threads. Sections stand in the
+//! order in which a merge needs them, so that many parts are read side by side, each from its beginning to its end, and
+//! only one tree's cells are in memory at a time.
+
+mod header;
+mod merge;
+mod read;
+mod section;
+mod write;
+
+use std::io;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use crate::filtering::Filtering;
+
+pub use merge::{Merged, Parts};
+pub use read::Part;
+pub use write::{Written, write};
+
+/// The first bytes; the last is the version.
+const MAGIC: [u8; 8] = *b"TSRpart\x02";
+
+/// What keeps a part from being written, read or added.
+#[derive(Debug, thiserror::Error)]
+pub enum PartError {
+    /// The system says why.
+    #[error("cannot {what} {}: {why}", path.display())]
+    File {
+        /// What was tried.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        why: io::Error,
+    },
+    /// Something else.
+    #[error("{} is not a part: it does not begin as one", .0.display())]
+    Foreign(PathBuf),
+    /// Of another format.
+    #[error("{} is a part of version {version}, and this program reads {}; render it again with this one", path.display(), MAGIC[7])]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: u8,
+    },
+    /// Cut off.
+    #[error("{} is not whole: it ends too early", .0.display())]
+    Truncated(PathBuf),
+    /// Bits were changed.
+    #[error("{} is damaged: its checksums do not match", .0.display())]
+    Damaged(PathBuf),
+    /// Of another frame.
+    #[error("{} belongs to another picture: its {what} is \"{theirs}\" instead of \"{ours}\"", path.display())]
+    Mismatch {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// The value in the file.
+        theirs: String,
+        /// The value that was expected.
+        ours: String,
+    },
+    /// Two parts are of different frames.
+    #[error(
+        "{} and {} are of different pictures: their {what} is \"{}\" and \"{}\"",
+        paths[0].display(), paths[1].display(), values[0], values[1]
+    )]
+    Different {
+        /// The files.
+        paths: [PathBuf; 2],
+        /// What differs.
+        what: &'static str,
+        /// Its values.
+        values: [String; 2],
+    },
+    /// Two parts have the same samples.
+    #[error(
+        "{} and {} both have samples {}:{}; leave one of them out",
+        paths[0].display(), paths[1].display(), samples.start, samples.end
+    )]
+    Overlap {
+        /// The files.
+        paths: [PathBuf; 2],
+        /// The samples.
+        samples: std::ops::Range<u64>,
+    },
+    /// Nothing to add.
+    #[error("there are no parts to merge")]
+    None,
+    /// It ends where others cannot go on.
+    #[error(
+        "{} ends at sample {end}, within {epoch} that share with each other: finish it with --resume before it is added to \
+         others", path.display()
+    )]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+        /// Its last sample and one.
+        end: u64,
+        /// Length of an epoch.
+        epoch: u64,
+    },
+    /// Its filter cannot be taken apart.
+    #[error("a frame with the filter \"{0}\" cannot be stored in parts; use --filter adaptive or none")]
+    Filter(&'static str),
+}
+
+/// Whether frames of this filter can be stored.
+///
+/// # Errors
+/// [`PartError::Filter`].
+pub fn storable(filtering: &Filtering) -> Result<(), PartError> {
+    match filtering {
+        Filtering::None | Filtering::Adaptive(..) => Ok(()),
+        Filtering::Talk(..) => Err(PartError::Filter(filtering.name())),
+    }
+}
+
+/// Tiles that are read or written at once: enough for many threads, at about a tenth of a megabyte each.
+const BATCH: usize = 64;
+
+/// Tiles in batches.
+fn batches(tiles: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let end = tiles.end;
+    tiles.step_by(BATCH).map(move |first| first..(first + BATCH).min(end))
+}
