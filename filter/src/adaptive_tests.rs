@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::{PackedRgb, StoredError};
+use crate::{Lobe, PackedRgb, StoredError};
 
 const ANCHOR: Anchor = Anchor { origin: DVec3::ZERO, extent: 8.0 };
 

@@ -194,9 +194,12 @@ impl Pairs {
     }
 
     fn compact(&mut self) {
-        self.pairs[self.compact..].sort_unstable_by_key(Pair::order);
-        // The stable sort finds the two sorted runs and merges them.
-        self.pairs.sort_by_key(Pair::order);
+        // Each block brings its slots in order: the stable sort finds those runs and merges them. Then there are a few pairs
+        // of each slot, most of them in order.
+        self.pairs.sort_by_key(Pair::slot);
+        for of_slot in self.pairs.chunk_by_mut(|a, b| a.slot() == b.slot()) {
+            of_slot.sort_unstable_by_key(Pair::order);
+        }
         self.pairs.dedup_by(|next, kept| next.order() == kept.order() && kept.absorb(next));
         self.compact = self.pairs.len();
         self.pairs.shrink_to(self.compact + self.compact / 2);
@@ -217,7 +220,7 @@ impl Pairs {
         self.compact();
         // Products are rounded one by one and summed as integers: the order of cells within a slot, which depends on who
         // met them first, does not count.
-        let scale = 2f64.powi(RESOLVED_BITS);
+        let scale = 2f64.powi(RESOLVED_BITS) / quantum.radiance();
         let mut sums: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
         // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
         // where the overflow came does not count either.
@@ -230,13 +233,11 @@ impl Pairs {
             let Some((_, lobes)) = sums.last_mut() else { continue };
             let estimate = read(pair.lobe(), pair.tree() as usize, pair.cell);
             for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(estimate) {
-                *sum += (throughput as f64 * f64::from(x) / quantum.radiance() * scale) as i128;
+                *sum += whole(throughput as f64 * f64::from(x) * scale);
             }
         }
-        let radiance = |sum: [i128; 3]| {
-            let unit = quantum.radiance() / scale * 2f64.powi(-THROUGHPUT_BITS);
-            (DVec3::from_array(sum.map(|x| x as f64)) * unit).as_vec3()
-        };
+        let unit = scale.recip() * 2f64.powi(-THROUGHPUT_BITS);
+        let radiance = |sum: [i128; 3]| (DVec3::from_array(sum.map(float)) * unit).as_vec3();
         let own_radiance = |sum: [i64; 3]| {
             (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
         };
@@ -258,6 +259,18 @@ impl Pairs {
         slots.extend(own.map(|(slot, own)| (*slot, resolved(Default::default(), own))));
         slots
     }
+}
+
+/// ⌊x⌋ of a positive number; nearly all are short, for which there are instructions.
+#[inline]
+fn whole(x: f64) -> i128 {
+    if x.abs() < 2f64.powi(63) { i128::from(x as i64) } else { x as i128 }
+}
+
+/// Nearest number, likewise.
+#[inline]
+fn float(x: i128) -> f64 {
+    i64::try_from(x).map_or_else(|_| x as f64, |x| x as f64)
 }
 
 /// Quanta of the resolved sums per quantum of radiance times throughput, log₂: 2⁻¹⁰ of a rounding that f32 makes anyway.

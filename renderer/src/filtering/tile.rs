@@ -96,9 +96,9 @@ pub struct Paths {
 }
 
 impl Paths {
-    /// No path yet.
-    pub fn new(selection: Selection) -> Self {
-        Self { records: Vec::new(), selection }
+    /// No path yet, and room for them.
+    pub fn new(selection: Selection, records: Vec<PathRecord>) -> Self {
+        Self { records, selection }
     }
 }
 
