@@ -88,7 +88,9 @@ impl Pair {
 /// Sums of one slot that need no cell, in quanta: of 2⁻²⁴ units, up to 2³⁹ of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Own {
+    /// What paths bring through glossy lobes: of even samples and of odd ones.
     glossy: [[i64; 3]; 2],
+    /// What they bring that no cell could take: through diffuse lobes and through glossy ones.
     unfiltered: [[i64; 3]; 2],
 }
 
@@ -104,10 +106,42 @@ impl Own {
         let list = |at: usize| [words[at], words[at + 1], words[at + 2]];
         Self { glossy: [list(0), list(3)], unfiltered: [list(6), list(9)] }
     }
+}
 
-    fn absorb(&mut self, other: &Self) {
-        let (mine, others) = (self.to_words(), other.to_words());
-        *self = Self::from_words(std::array::from_fn(|i| mine[i].saturating_add(others[i])));
+/// Two sums for each of some slots, by slot.
+#[derive(Debug, Default)]
+struct SlotSums {
+    sums: Vec<(u32, [[i64; 3]; 2])>,
+    /// Where in it the last path's slot is.
+    last: usize,
+}
+
+impl SlotSums {
+    /// The sums of a slot.
+    fn at(&mut self, slot: u32) -> &mut [[i64; 3]; 2] {
+        // Paths of a slot come one after the other.
+        if self.sums.get(self.last).is_none_or(|(at, _)| *at != slot) {
+            self.last = self.sums.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
+                if self.sums.len() == self.sums.capacity() {
+                    self.sums.reserve_exact((self.sums.len() / 4).max(16));
+                }
+                self.sums.insert(at, (slot, Default::default()));
+                at
+            });
+        }
+        &mut self.sums[self.last].1
+    }
+
+    /// Adds to the sums of a slot.
+    fn absorb(&mut self, slot: u32, others: &[[i64; 3]; 2]) {
+        if *others != [[0; 3]; 2] {
+            let sums = self.at(slot).as_flattened_mut();
+            sums.iter_mut().zip(others.as_flattened()).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.sums.capacity() * size_of::<(u32, [[i64; 3]; 2])>()
     }
 }
 
@@ -117,10 +151,10 @@ pub(crate) struct Pairs {
     /// Sorted and without repetition up to `compact`, then as they came.
     pairs: Vec<Pair>,
     compact: usize,
-    /// By slot.
-    own: Vec<(u32, Own)>,
-    /// Where in it the last path's slot is.
-    last: usize,
+    /// See [`Own::glossy`], of slots that have some.
+    glossy: SlotSums,
+    /// See [`Own::unfiltered`], likewise: there are hardly any.
+    unfiltered: SlotSums,
 }
 
 impl Pairs {
@@ -150,24 +184,27 @@ impl Pairs {
 
     /// Adds what a path brings through glossy lobes.
     pub fn add_own(&mut self, slot: u32, odd: bool, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own(slot).glossy[usize::from(odd)], radiance, quantum);
+        add_quanta(&mut self.glossy.at(slot)[usize::from(odd)], radiance, quantum);
     }
 
     /// Adds what a path brings that no cell could take.
     pub fn add_unfiltered(&mut self, slot: u32, lobe: Lobe, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own(slot).unfiltered[lobe as usize], radiance, quantum);
+        add_quanta(&mut self.unfiltered.at(slot)[lobe as usize], radiance, quantum);
     }
 
-    /// Sums of a slot.
-    fn own(&mut self, slot: u32) -> &mut Own {
-        // Paths of a slot come one after the other.
-        if self.own.get(self.last).is_none_or(|(at, _)| *at != slot) {
-            self.last = self.own.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
-                self.own.insert(at, (slot, Own::default()));
-                at
-            });
+    /// Sums of slots, by slot.
+    fn own(&self) -> Vec<(u32, Own)> {
+        let mut own = Vec::with_capacity(self.glossy.sums.len().max(self.unfiltered.sums.len()));
+        let mut unfiltered = self.unfiltered.sums.iter().copied().peekable();
+        for &(slot, glossy) in &self.glossy.sums {
+            while let Some((slot, unfiltered)) = unfiltered.next_if(|(at, _)| *at < slot) {
+                own.push((slot, Own { unfiltered, ..Own::default() }));
+            }
+            let same = unfiltered.next_if(|(at, _)| *at == slot).map(|(_, sums)| sums);
+            own.push((slot, Own { glossy, unfiltered: same.unwrap_or_default() }));
         }
-        &mut self.own[self.last].1
+        own.extend(unfiltered.map(|(slot, unfiltered)| (slot, Own { unfiltered, ..Own::default() })));
+        own
     }
 
     /// Ends a block.
@@ -179,9 +216,9 @@ impl Pairs {
     }
 
     /// All pairs and own sums, of blocks that have ended.
-    pub fn parts(&mut self) -> (&[Pair], &[(u32, Own)]) {
+    pub fn parts(&mut self) -> (&[Pair], Vec<(u32, Own)>) {
         self.compact();
-        (&self.pairs, &self.own)
+        (&self.pairs, self.own())
     }
 
     /// Adds others', whose cells have the numbers of the large tables.
@@ -189,7 +226,8 @@ impl Pairs {
         self.pairs.extend(pairs);
         self.end_block();
         for (slot, sums) in own {
-            self.own(*slot).absorb(sums);
+            self.glossy.absorb(*slot, &sums.glossy);
+            self.unfiltered.absorb(*slot, &sums.unfiltered);
         }
     }
 
@@ -212,7 +250,7 @@ impl Pairs {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.pairs.capacity() * size_of::<Pair>() + self.own.capacity() * size_of::<(u32, Own)>()
+        self.pairs.capacity() * size_of::<Pair>() + self.glossy.bytes() + self.unfiltered.bytes()
     }
 
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
@@ -247,7 +285,8 @@ impl Pairs {
             glossy_own: own.glossy.map(own_radiance),
         };
         // Both lists are by slot, and a slot may be in one alone.
-        let mut own = self.own.iter().peekable();
+        let own = self.own();
+        let mut own = own.iter().peekable();
         let mut slots = Vec::with_capacity(sums.len());
         for (slot, lobes) in sums {
             while let Some((slot, own)) = own.next_if(|(at, _)| *at < slot) {

@@ -44,7 +44,7 @@ impl Adaptive {
         words.extend(pairs.iter().flat_map(|pair| pair.to_words()));
         words.push(own.len() as u64);
         for (slot, own) in own {
-            words.push((*slot).into());
+            words.push(slot.into());
             words.extend(own.to_words().map(|x| x as u64));
         }
     }
