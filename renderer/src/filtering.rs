@@ -154,7 +154,7 @@ impl FrameFilter {
         let most = (TILE * TILE) as usize * (samples.end - samples.start) as usize;
         let keeper = |mut records: Vec<PathRecord>| {
             records.reserve_exact(most);
-            Paths::new(selection, records)
+            Paths { records, selection }
         };
         records.into_iter().map(keeper).collect()
     }

@@ -92,13 +92,13 @@ pub enum Selection {
 pub struct Paths {
     /// Those with a selected vertex.
     pub records: Vec<PathRecord>,
-    selection: Selection,
+    pub(super) selection: Selection,
 }
 
 impl Paths {
-    /// No path yet, and room for them.
-    pub fn new(selection: Selection, records: Vec<PathRecord>) -> Self {
-        Self { records, selection }
+    /// No path yet.
+    pub fn new(selection: Selection) -> Self {
+        Self { records: Vec::new(), selection }
     }
 }
 
