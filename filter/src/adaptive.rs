@@ -3,14 +3,15 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::first::{Batch, Part, Rules};
-use crate::grid::{Anchor, Grid, LeafCell, Place};
+use crate::first::{self, Part, Rules};
+use crate::grid::{Anchor, Grid, LeafCell, Places};
 use crate::pairs::Lobe as PairLobe;
-use crate::record::{Lobe, PathRecord, Vertex};
-use crate::shards::{ShardedIndex, ShardedTable};
+use crate::record::{PathRecord, Vertex};
+use crate::second::{self, SecondVertices, Suffixes};
+use crate::shards::ShardedTable;
 use crate::shrink::{Shrinkage, estimate};
 use crate::sides::Sides;
-use crate::sums::{LUMINANCE, Quantum};
+use crate::sums::Quantum;
 use crate::table::Table;
 
 /// Settings. The defaults are measured, not derived.
@@ -78,7 +79,7 @@ pub struct Report {
 /// A tree of cells of second vertices.
 #[derive(Debug)]
 pub(crate) struct Tree {
-    grid: Grid,
+    pub grid: Grid,
     pub cells: ShardedTable,
 }
 
@@ -87,11 +88,11 @@ fn grids(anchor: &Anchor, count: u32) -> impl Iterator<Item = Grid> {
     (0..count).map(move |index| Grid::new(anchor, index, count))
 }
 
-/// A vertex as grids see it, with finest cells of `side` footprints.
+/// Adds a vertex to places, with finest cells of `side` footprints and a bin of 0.
 #[inline]
-pub(crate) fn place(vertex: &Vertex, side: f32, bin: u8) -> Place {
-    let attributes = u64::from(vertex.surface()) << 8 | u64::from(bin);
-    Place::new(vertex.p, vertex.n.direction(), side * vertex.footprint.get(), attributes)
+pub(crate) fn place(places: &mut Places, vertex: &Vertex, side: f32, finest: i32) {
+    let attributes = u64::from(vertex.surface()) << 8;
+    places.push(vertex.p, vertex.n.direction(), side * vertex.footprint.get(), finest, attributes);
 }
 
 /// Sums over all paths so far.
@@ -154,23 +155,25 @@ impl Adaptive {
     /// If there are not as many parts as were announced.
     pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
         assert_eq!(parts.len(), self.parts.len(), "parts of a block");
-        let suffixes = self.suffixes(parts);
+        let (vertices, estimates) = self.share(parts);
         let rules = Rules { params: &self.params, quantum: &self.quantum, grids: &self.grids };
-        let unfiltered = (&mut self.parts, parts, &suffixes)
+        let unfiltered = (&mut self.parts, parts, &vertices)
             .into_par_iter()
-            .map_init(Batch::default, |batch, (part, records, suffixes)| part.add(records, suffixes, &rules, batch));
+            .map_init(first::Batch::default, |batch, (part, records, vertices)| {
+                part.add(records, &Suffixes::new(vertices, &estimates), &rules, batch)
+            });
         self.report.unfiltered += unfiltered.sum::<u64>();
         self.report.paths += parts.iter().map(|records| records.len() as u64).sum::<u64>();
         self.cells = None;
     }
 
-    /// What arrives at the second vertex of each path, filtered over the block.
-    fn suffixes(&mut self, parts: &[Vec<PathRecord>]) -> Vec<Vec<Vec3>> {
-        let (trees, quantum) = (&self.second, &self.quantum);
-        let places: Vec<SecondVertices> = parts
-            .par_iter()
-            .map(|records| SecondVertices::new(records, trees, self.params.second_leaf, quantum))
-            .collect();
+    /// Deposits a block's second vertices, and estimates all cells of the epoch so far, tree by tree.
+    fn share(&mut self, parts: &[Vec<PathRecord>]) -> (Vec<SecondVertices>, Vec<Vec<Vec<[f32; 3]>>>) {
+        let (trees, quantum, side) = (&self.second, &self.quantum, self.params.second_leaf);
+        let vertices = parts.par_iter().map_init(second::Batch::default, |batch, records| {
+            SecondVertices::new(records, trees, side, quantum, batch)
+        });
+        let vertices = vertices.collect();
         self.report.second_cells = 0;
         let mut estimates = Vec::new();
         for tree in trees {
@@ -178,7 +181,7 @@ impl Adaptive {
             estimates.push(estimate);
             self.report.second_cells += cells;
         }
-        parts.par_iter().zip(&places).map(|(records, places)| places.read(records, &estimates)).collect()
+        (vertices, estimates)
     }
 
     /// The tables of the first vertices' tree, diffuse and then glossy, by part.
@@ -269,53 +272,6 @@ impl Adaptive {
             + self.second.iter().map(|tree| tree.cells.bytes()).sum::<usize>();
         bytes as u64
     }
-}
-
-/// The second vertices of a part of a block.
-struct SecondVertices {
-    /// Which paths have one that a cell took.
-    taken: Vec<bool>,
-    /// Places of those, tree by tree.
-    places: Vec<Vec<ShardedIndex>>,
-}
-
-impl SecondVertices {
-    /// Deposits them.
-    fn new(records: &[PathRecord], trees: &[Tree], side: f32, quantum: &Quantum) -> Self {
-        let deposit = |record: &PathRecord| {
-            let deposit = quantum.deposit(record.suffix.get(), weight(record))?;
-            let place = record.second.exists().then(|| place(&record.second, side, 0))?;
-            // All trees take it or none.
-            trees.iter().all(|tree| tree.grid.leaf(&place).is_some()).then_some((place, deposit))
-        };
-        let deposits: Vec<Option<(Place, _)>> = records.iter().map(deposit).collect();
-        let in_tree = |tree: &Tree| {
-            let keyed =
-                deposits.iter().flatten().filter_map(|(place, deposit)| Some((tree.grid.leaf(place)?, *deposit)));
-            tree.cells.add(&keyed.collect::<Vec<_>>())
-        };
-        Self { taken: deposits.iter().map(Option::is_some).collect(), places: trees.iter().map(in_tree).collect() }
-    }
-
-    /// What arrives at each path's, given the estimates of all cells, tree by tree.
-    fn read(&self, records: &[PathRecord], estimates: &[Vec<Vec<[f32; 3]>>]) -> Vec<Vec3> {
-        let share = (estimates.len() as f32).recip();
-        let mut next = 0..;
-        let read = |(record, &taken): (&PathRecord, &bool)| {
-            // A vertex that no cell took keeps its own light.
-            let Some(at) = taken.then(|| next.next()).flatten() else { return record.suffix.get() };
-            let found = self.places.iter().zip(estimates).map(|(places, tree)| Vec3::from_array(places[at].of(tree)));
-            found.sum::<Vec3>() * share
-        };
-        records.iter().zip(&self.taken).map(read).collect()
-    }
-}
-
-/// What light at the second vertex counts for in the slot: as weights of the mean over a cell these keep its energy, for
-/// the sum of weight × mean is that of weight × own.
-fn weight(record: &PathRecord) -> f32 {
-    let through = |lobe: &Lobe| lobe.throughput.get() * lobe.transfer.get();
-    (through(&record.diffuse) + through(&record.glossy)).dot(LUMINANCE.as_vec3()).abs()
 }
 
 #[cfg(test)]

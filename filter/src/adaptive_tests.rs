@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::{Branch, Merging, PackedRgb, Slots, StoredError};
+use crate::{Branch, Lobe, Merging, PackedRgb, Slots, StoredError};
 
 const ANCHOR: Anchor = Anchor { origin: DVec3::ZERO, extent: 8.0 };
 

@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use crate::adaptive::{Params, place};
-use crate::grid::{Grid, LeafCell, Place};
+use crate::grid::{Grid, LeafCell, Places};
 use crate::pairs::{Lobe as PairLobe, Pairs};
 use crate::record::{Lobe, PathRecord};
+use crate::second::Suffixes;
 use crate::sums::{Deposit, Quantum};
 use crate::table::Table;
 
@@ -28,25 +29,27 @@ pub(crate) struct Rules<'a> {
 struct Share {
     /// Number of the path in its batch.
     path: u32,
-    bin: u8,
-    incident: Vec3,
-    /// `None`: no cell takes it.
-    deposit: Option<Deposit>,
-    /// The cell that the path reads.
+    /// The tree that the path reads.
+    tree: u32,
+    /// The cell that it reads, and [`NOWHERE`] if there is none.
     read: u32,
+    bin: u8,
+    /// A tree without a cell was met: the others after it get nothing.
+    lost: bool,
+    deposit: Deposit,
+    throughput: Vec3,
+    incident: Vec3,
 }
 
-/// Paths that are worked on together, one tree after the other, so that a tree's cells stay in the cache.
-const BATCH: usize = 256;
-
-/// Room for a batch, to be used again.
+/// Room for a batch, to be used again. The paths of a batch are worked on together, one tree after the other, so that a
+/// tree's cells stay in the cache.
 #[derive(Default)]
 pub(crate) struct Batch {
-    places: Vec<Place>,
-    leaves: Vec<Option<LeafCell>>,
+    places: Places,
+    leaves: Vec<LeafCell>,
     shares: [Vec<Share>; 2],
-    /// Whether all of a path's light went to cells.
-    taken: Vec<bool>,
+    /// Paths of which some light went to no cell.
+    unfiltered: Vec<u32>,
 }
 
 impl Part {
@@ -61,13 +64,25 @@ impl Part {
         self.pairs.bytes() + self.cells.iter().flatten().map(Table::bytes).sum::<usize>()
     }
 
-    /// Adds a block's paths, at whose second vertices `suffixes` arrive; how many stay unfiltered.
-    pub fn add(&mut self, records: &[PathRecord], suffixes: &[Vec3], rules: &Rules<'_>, batch: &mut Batch) -> u64 {
+    /// Adds a block's paths, with what arrives at their second vertices; how many stay unfiltered.
+    pub fn add(
+        &mut self,
+        records: &[PathRecord],
+        suffixes: &Suffixes<'_>,
+        rules: &Rules<'_>,
+        batch: &mut Batch,
+    ) -> u64 {
         let mut unfiltered = 0;
-        for (records, suffixes) in records.chunks(BATCH).zip(suffixes.chunks(BATCH)) {
-            batch.gather(records, suffixes, rules, &mut self.pairs);
+        if !records.is_empty() {
+            self.cells.iter().flatten().for_each(Table::warm);
+        }
+        for (first, records) in (0..).step_by(Places::MOST).zip(records.chunks(Places::MOST)) {
+            batch.gather(records, |path| suffixes.get(first + path, &records[path]), rules, &mut self.pairs);
             for (tree, grid) in rules.grids.iter().enumerate() {
-                batch.deposit(tree, grid, rules.grids.len(), records, &mut self.cells);
+                grid.leaves(&batch.places, &mut batch.leaves);
+                for (shares, cells) in batch.shares.iter_mut().zip(&mut self.cells) {
+                    deposit(shares, &batch.leaves, tree as u32, &mut cells[tree]);
+                }
             }
             unfiltered += batch.read(records, rules, &mut self.pairs);
         }
@@ -78,56 +93,37 @@ impl Part {
 
 impl Batch {
     /// Finds out what the paths bring, and where.
-    fn gather(&mut self, records: &[PathRecord], suffixes: &[Vec3], rules: &Rules<'_>, pairs: &mut Pairs) {
+    fn gather(&mut self, records: &[PathRecord], suffix: impl Fn(usize) -> Vec3, rules: &Rules<'_>, pairs: &mut Pairs) {
         self.shares.iter_mut().for_each(Vec::clear);
+        self.unfiltered.clear();
         self.places.clear();
-        self.places.extend(records.iter().map(|record| place(&record.first, rules.params.leaf, 0)));
-        self.taken.clear();
-        self.taken.resize(records.len(), true);
-        for ((path, record), &suffix) in (0..).zip(records).zip(suffixes) {
-            let exists = record.first.exists();
+        let finest = rules.grids[0].finest();
+        for (path, record) in records.iter().enumerate() {
+            place(&mut self.places, &record.first, rules.params.leaf, finest);
+            let (exists, suffix) = (record.first.exists(), suffix(path));
+            let tree = u32::from(record.sample()) % rules.grids.len() as u32;
+            let path = path as u32;
             let mut share = |lobe: &Lobe, kind: PairLobe, bin: u8| {
-                let incident = lobe.incident(suffix);
-                let deposit = if exists { rules.quantum.deposit(incident, 1.0) } else { None };
-                self.shares[kind as usize].push(Share { path, bin, incident, deposit, read: NOWHERE });
-                incident
+                let (incident, throughput) = (lobe.incident(suffix), lobe.throughput.get());
+                match rules.quantum.deposit(incident, 1.0).filter(|_| exists) {
+                    Some(deposit) => {
+                        let share =
+                            Share { path, tree, read: NOWHERE, bin, lost: false, deposit, throughput, incident };
+                        self.shares[kind as usize].push(share);
+                    }
+                    None => {
+                        self.unfiltered.push(path);
+                        pairs.add_unfiltered(record.slot, kind, throughput * incident, rules.quantum);
+                    }
+                }
+                throughput * incident
             };
             if !record.diffuse.is_black() {
                 share(&record.diffuse, PairLobe::Diffuse, 0);
             }
             if !record.glossy.is_black() {
-                let incident = share(&record.glossy, PairLobe::Glossy, record.first.bin());
-                pairs.add_own(record.slot, record.odd(), record.glossy.throughput.get() * incident, rules.quantum);
-            }
-        }
-    }
-
-    /// Adds all shares to their cells of one tree, of which there are `trees`. Both lobes have the same grid.
-    fn deposit(
-        &mut self,
-        tree: usize,
-        grid: &Grid,
-        trees: usize,
-        records: &[PathRecord],
-        cells: &mut [Vec<Table<LeafCell>>; 2],
-    ) {
-        self.leaves.clear();
-        self.leaves.extend(self.places.iter().map(|place| grid.leaf(place)));
-        for (shares, cells) in self.shares.iter_mut().zip(cells) {
-            let cells = &mut cells[tree];
-            for share in shares {
-                let Some(deposit) = &share.deposit else { continue };
-                // A place at the very border of the extent may have cells in some trees only: it is deposited in the
-                // first of those, and the path reads its own light.
-                let Some(leaf) = self.leaves[share.path as usize] else {
-                    (share.deposit, share.read) = (None, NOWHERE);
-                    continue;
-                };
-                let cell = cells.cell(leaf.with_bin(share.bin));
-                cells.add(cell, deposit);
-                if usize::from(records[share.path as usize].sample()) % trees == tree {
-                    share.read = cell;
-                }
+                let radiance = share(&record.glossy, PairLobe::Glossy, record.first.bin());
+                pairs.add_own(record.slot, record.odd(), radiance, rules.quantum);
             }
         }
     }
@@ -136,20 +132,33 @@ impl Batch {
     fn read(&mut self, records: &[PathRecord], rules: &Rules<'_>, pairs: &mut Pairs) -> u64 {
         for (shares, kind) in self.shares.iter().zip([PairLobe::Diffuse, PairLobe::Glossy]) {
             for share in shares {
-                let record = &records[share.path as usize];
-                let throughput = match kind {
-                    PairLobe::Diffuse => record.diffuse.throughput,
-                    PairLobe::Glossy => record.glossy.throughput,
-                };
-                let throughput = throughput.get();
-                let tree = u32::from(record.sample()) % rules.grids.len() as u32;
-                if share.read == NOWHERE || !pairs.add(record.slot, kind, tree, share.read, throughput) {
-                    self.taken[share.path as usize] = false;
-                    pairs.add_unfiltered(record.slot, kind, throughput * share.incident, rules.quantum);
+                let slot = records[share.path as usize].slot;
+                let (throughput, incident) = (share.throughput, share.incident);
+                if share.read == NOWHERE || !pairs.add(slot, kind, share.tree, share.read, throughput) {
+                    self.unfiltered.push(share.path);
+                    pairs.add_unfiltered(slot, kind, throughput * incident, rules.quantum);
                 }
             }
         }
-        self.taken.iter().map(|taken| u64::from(!taken)).sum()
+        self.unfiltered.sort_unstable();
+        self.unfiltered.dedup();
+        self.unfiltered.len() as u64
+    }
+}
+
+/// Adds shares to their cells of one tree.
+fn deposit(shares: &mut [Share], leaves: &[LeafCell], tree: u32, cells: &mut Table<LeafCell>) {
+    for share in shares {
+        let leaf = leaves[share.path as usize];
+        // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of
+        // those, and the path reads its own light.
+        if !leaf.exists() || share.lost {
+            (share.lost, share.read) = (true, NOWHERE);
+            continue;
+        }
+        let cell = cells.cell(leaf.with_bin(share.bin));
+        cells.add(cell, &share.deposit);
+        share.read = if share.tree == tree { cell } else { share.read };
     }
 }
 

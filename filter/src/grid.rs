@@ -76,6 +76,18 @@ impl CellKey {
         (key.level().abs() <= 1 << 12 && bits as u64 >> (3 * COORDINATE_BITS) == 0).then_some(key)
     }
 
+    /// Level and attributes.
+    #[inline]
+    pub fn upper(self) -> u64 {
+        (self.0 >> 64) as u64
+    }
+
+    /// The code of the coordinates.
+    #[inline]
+    pub fn lower(self) -> u64 {
+        self.0 as u64
+    }
+
     /// All bits.
     pub fn bits(self) -> u128 {
         self.0
@@ -150,27 +162,56 @@ impl Grid {
         Self { corner: anchor.origin - shift, inverse_scale: scale.recip(), finest, turn }
     }
 
-    /// The finest cell of a place; `None` for one outside the extent.
-    #[inline]
-    pub fn leaf(&self, place: &Place) -> Option<LeafCell> {
-        const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
-        let level = place.level.max(self.finest);
-        let at = (place.p - self.corner) * (self.inverse_scale * power_of_two(-level));
-        // ±2²⁰ cells: further away than any footprint is small. The borders are whole, so this holds for the floor too.
-        let within = at.min_element() >= -HALF && at.max_element() < HALF;
-        let attributes = place.attributes << FACING_BITS | u64::from(facing(self.turn * place.n));
-        within.then(|| LeafCell::new(level, attributes, at.to_array().map(floor)))
+    /// Finest level of cells, in this tree and all others of the anchor.
+    pub fn finest(&self) -> i32 {
+        self.finest
+    }
+
+    /// The finest cells of places, which know [`Self::finest`]; none for those outside the extent.
+    pub fn leaves(&self, places: &Places, leaves: &mut Vec<LeafCell>) {
+        // Loops without branches over arrays: the compiler makes vector instructions of them.
+        let length = places.upper.len();
+        let mut cells = [NO_CELL; Places::MOST];
+        let [x, y, z] = places.p.each_ref().map(|x| &x[..length]);
+        let [corner_x, corner_y, corner_z] = self.corner.to_array();
+        for ((cell, scale), ((x, y), z)) in cells.iter_mut().zip(&places.inverse_side).zip(x.iter().zip(y).zip(z)) {
+            let scale = self.inverse_scale * scale;
+            let [x, y, z] = [(x - corner_x) * scale, (y - corner_y) * scale, (z - corner_z) * scale];
+            // ±2²⁰ cells: further away than any footprint is small. The borders are whole, so this holds for the floor too.
+            let inside = |x: f64| x >= -HALF && x < HALF;
+            let within = inside(x) & inside(y) & inside(z);
+            let found = floor(x) | floor(y) << COORDINATE_BITS | floor(z) << (2 * COORDINATE_BITS);
+            *cell = if within { found } else { NO_CELL };
+        }
+        let mut facings = [0; Places::MOST];
+        let [x, y, z] = places.n.each_ref().map(|x| &x[..length]);
+        for (out, ((x, y), z)) in facings.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            *out = facing(self.turn * Vec3::new(*x, *y, *z));
+        }
+        leaves.clear();
+        leaves.extend(
+            places.upper.iter().zip(&facings).zip(&cells).map(|((upper, facing), cell)| LeafCell {
+                level_and_attributes: upper | u64::from(*facing),
+                cell: *cell,
+            }),
+        );
     }
 }
+
+/// A coordinate of cells is in ± this.
+const HALF: f64 = (1u32 << (COORDINATE_BITS - 1)) as f64;
 
 /// Bits of an attribute that say which way a surface faces.
 const FACING_BITS: u32 = 3;
 
-/// ⌊x⌋ of a number that fits: without a call, which the baseline of x86-64 needs for f64::floor.
+/// The bits of ⌊x⌋ that a coordinate has, for x in ±2²⁰.
 #[inline]
-fn floor(x: f64) -> i32 {
-    let whole = x as i32;
-    whole - i32::from(f64::from(whole) > x)
+fn floor(x: f64) -> u64 {
+    // So large that the units of its sum with x are the lowest bits: there are no vector instructions for a conversion.
+    const LARGE: f64 = 1.5 * (1u64 << 52) as f64;
+    let sum = x + LARGE;
+    let rounded_up = sum - LARGE > x;
+    sum.to_bits().wrapping_sub(u64::from(rounded_up)) & COORDINATE
 }
 
 /// A cell by its coordinates: quicker to make than a [`CellKey`], and as exact.
@@ -183,11 +224,10 @@ pub struct LeafCell {
 }
 
 impl LeafCell {
+    /// Whether it is a cell.
     #[inline]
-    fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
-        let [x, y, z] = cell.map(|x| x as u64 & COORDINATE);
-        let level_and_attributes = u64::from((level + LEVEL_BIAS) as u16) << 48 | attributes & ATTRIBUTES;
-        Self { level_and_attributes, cell: x | y << COORDINATE_BITS | z << (2 * COORDINATE_BITS) }
+    pub fn exists(&self) -> bool {
+        self.cell != NO_CELL
     }
 
     /// The cell of the same place for vertices of attributes that differ by `bin` in their lower bits, which are 0 here.
@@ -212,6 +252,9 @@ impl LeafCell {
     }
 }
 
+/// Coordinates of no cell: those have 63 bits.
+const NO_CELL: u64 = u64::MAX;
+
 impl From<CellKey> for LeafCell {
     fn from(key: CellKey) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| gather(key.0 as u64 >> axis));
@@ -220,22 +263,38 @@ impl From<CellKey> for LeafCell {
     }
 }
 
-/// A vertex as grids see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    p: DVec3,
-    n: Vec3,
-    level: i32,
-    attributes: u64,
+/// Vertices as grids see them, coordinate by coordinate.
+#[derive(Clone, Debug, Default)]
+pub struct Places {
+    p: [Vec<f64>; 3],
+    n: [Vec<f32>; 3],
+    /// 2^-level.
+    inverse_side: Vec<f64>,
+    /// The upper half of their cells' keys, without the facing.
+    upper: Vec<u64>,
 }
 
-impl Place {
+impl Places {
+    /// Most places that [`Grid::leaves`] takes.
+    pub const MOST: usize = 256;
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.p.iter_mut().for_each(Vec::clear);
+        self.n.iter_mut().for_each(Vec::clear);
+        self.inverse_side.clear();
+        self.upper.clear();
+    }
+
     /// A vertex at `p` that faces `n`, whose finest cells are more than `side` / 4 and at most `side` / 2 wide before the
-    /// tree's scale, unless that is less than 2⁻¹⁸ of the extent. `attributes`: 45 bits that vertices must agree in to meet.
+    /// tree's scale, and of level `finest` at least. `attributes`: 45 bits that vertices must agree in to meet.
     #[inline]
-    pub fn new(p: [f32; 3], n: Vec3, side: f32, attributes: u64) -> Self {
-        let level = exponent_of(f64::from(side)) - 1;
-        Self { p: Vec3::from_array(p).as_dvec3(), n, level, attributes }
+    pub fn push(&mut self, p: [f32; 3], n: Vec3, side: f32, finest: i32, attributes: u64) {
+        let level = (exponent_of(f64::from(side)) - 1).max(finest);
+        self.p.iter_mut().zip(p).for_each(|(list, x)| list.push(x.into()));
+        self.n.iter_mut().zip(n.to_array()).for_each(|(list, x)| list.push(x));
+        self.inverse_side.push(power_of_two(-level));
+        self.upper.push(u64::from((level + LEVEL_BIAS) as u16) << 48 | attributes << FACING_BITS & ATTRIBUTES);
     }
 }
 
@@ -243,14 +302,10 @@ impl Place {
 #[inline]
 fn facing(n: Vec3) -> u32 {
     let a = n.abs();
-    let (axis, component) = if a.x >= a.y && a.x >= a.z {
-        (0, n.x)
-    } else if a.y >= a.z {
-        (1, n.y)
-    } else {
-        (2, n.z)
-    };
-    2 * axis + u32::from(component < 0.0)
+    let (along_x, above) = ((a.x >= a.y) & (a.x >= a.z), a.y >= a.z);
+    let (axis, component) = if above { (2, n.y) } else { (4, n.z) };
+    let (axis, component) = if along_x { (0, n.x) } else { (axis, component) };
+    axis + u32::from(component < 0.0)
 }
 
 /// ⌊log₂ x⌋ of a positive normal number.
@@ -266,99 +321,5 @@ pub(crate) fn power_of_two(e: i32) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    const ANCHOR: Anchor = Anchor { origin: DVec3::new(3.0, -2.0, 7.0), extent: 20.0 };
-
-    proptest! {
-        #[test]
-        fn cells_nest(x in -20.0f32..20.0, y in -20.0f32..20.0, z in -20.0f32..20.0, tree in 0u32..4, up in 1i32..8) {
-            let grid = Grid::new(&ANCHOR, tree, 4);
-            let fine = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01, 5)).unwrap().key();
-            let coarse = grid.leaf(&Place::new([x, y, z], Vec3::Z, 0.01 * power_of_two(up) as f32, 5)).unwrap().key();
-            let ancestor = (0..up).fold(fine, |key, _| key.parent());
-            prop_assert_eq!(ancestor, coarse);
-            prop_assert_eq!(ancestor.level(), fine.level() + up);
-        }
-
-        #[test]
-        fn scaling_by_a_power_of_two_changes_the_level_alone(
-            x in -20.0f32..20.0, y in -20.0f32..20.0, side in 0.001f32..1.0, e in -20i32..=20, tree in 0u32..4,
-        ) {
-            let scale = power_of_two(e);
-            let scaled = Anchor { origin: ANCHOR.origin * scale, extent: ANCHOR.extent * scale };
-            let (a, b) = (Grid::new(&ANCHOR, tree, 4), Grid::new(&scaled, tree, 4));
-            let s = scale as f32;
-            let at = a.leaf(&Place::new([x, y, 1.0], Vec3::X, side, 1)).unwrap().key();
-            let there = b.leaf(&Place::new([x * s, y * s, s], Vec3::X, side * s, 1)).unwrap().key();
-            prop_assert_eq!(there.level(), at.level() + e);
-            prop_assert_eq!(there.bits() << 16, at.bits() << 16);
-        }
-
-        #[test]
-        fn ancestors_are_parents_of_parents(c in any::<[i32; 3]>(), up in 0i32..30) {
-            let key = CellKey::new(-7, 9, c.map(|x| x >> 11));
-            prop_assert_eq!(key.ancestor(key.level() + up), (0..up).fold(key, |key, _| key.parent()));
-            prop_assert_eq!(LeafCell::from(key).key(), key);
-        }
-
-        #[test]
-        fn parents_keep_the_order(a in any::<[i32; 3]>(), b in any::<[i32; 3]>()) {
-            let key = |c: [i32; 3]| CellKey::new(0, 9, c.map(|x| x >> 11));
-            let (a, b) = (key(a), key(b));
-            prop_assert_eq!(a.cmp(&b).then(a.parent().cmp(&b.parent())), a.cmp(&b));
-        }
-    }
-
-    #[test]
-    fn normals_and_attributes_separate() {
-        let grid = Grid::new(&ANCHOR, 0, 4);
-        let keys = [
-            grid.leaf(&Place::new([1.0; 3], Vec3::Z, 0.1, 1)),
-            grid.leaf(&Place::new([1.0; 3], -Vec3::Z, 0.1, 1)),
-            grid.leaf(&Place::new([1.0; 3], Vec3::X, 0.1, 1)),
-            grid.leaf(&Place::new([1.0; 3], Vec3::Z, 0.1, 2)),
-        ];
-        for (i, a) in keys.iter().enumerate() {
-            assert!(a.is_some());
-            assert!(keys[..i].iter().all(|b| a != b));
-        }
-    }
-
-    #[test]
-    fn walls_along_the_axes_are_separate_in_every_tree() {
-        let normals = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-        for count in 1..=8 {
-            for grid in (0..count).map(|index| Grid::new(&ANCHOR, index, count)) {
-                let key = |n: Vec3| grid.leaf(&Place::new([1.0; 3], n, 0.1, 1)).unwrap().key();
-                let mut keys: Vec<CellKey> = normals.iter().map(|n| key(*n)).collect();
-                keys.sort_unstable();
-                keys.dedup();
-                assert_eq!(keys.len(), 6);
-                // With room to spare: a bumpy wall is still one wall.
-                assert!(normals.iter().all(|n| key(*n) == key((*n + 0.2 * n.any_orthonormal_vector()).normalize())));
-            }
-        }
-    }
-
-    #[test]
-    fn no_border_passes_through_the_camera_or_at_a_round_distance_from_it() {
-        for grid in (0..8).map(|index| Grid::new(&ANCHOR, index, 8)) {
-            let shift = (ANCHOR.origin - grid.corner).to_array();
-            // No multiple of a 64th, which a border of cells of that side would be.
-            assert!(shift.iter().all(|x| (x * 64.0).fract() > 1e-3 && (x * 64.0).fract() < 1.0 - 1e-3), "{shift:?}");
-        }
-    }
-
-    #[test]
-    fn far_places_have_no_cell_and_all_of_the_scene_has_one() {
-        let grid = Grid::new(&ANCHOR, 0, 4);
-        assert_eq!(grid.leaf(&Place::new([1e9, 0.0, 0.0], Vec3::Z, 1e-6, 0)), None);
-        for side in [1e-30, 1e-6, 1.0] {
-            assert!(grid.leaf(&Place::new([23.0, -22.0, 27.0], Vec3::Z, side, 0)).is_some());
-        }
-    }
-}
+#[path = "grid_tests.rs"]
+mod tests;

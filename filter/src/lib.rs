@@ -67,6 +67,7 @@ mod hash;
 mod packed;
 mod pairs;
 mod record;
+mod second;
 mod shards;
 mod shrink;
 mod sides;

@@ -20,6 +20,36 @@ impl PackedRgb {
     #[inline]
     pub fn new(rgb: Vec3) -> Self {
         let largest = rgb.abs().max_element();
+        if largest.is_normal() && rgb.is_finite() { Self::of_normal(rgb, largest) } else { Self::of_any(rgb) }
+    }
+
+    /// By shifts of the mantissas, if the largest of the numbers is normal.
+    #[inline]
+    fn of_normal(rgb: Vec3, largest: f32) -> Self {
+        // An f32 is an integer of 24 bits times 2 to the power of its biased exponent - 150; subnormal ones have the biased
+        // exponent 1.
+        let parts = |x: f32| {
+            let exponent = x.to_bits() >> 23 & 0xff;
+            (x.to_bits() & 0x7f_ffff | u32::from(exponent > 0) << 23, exponent.max(1))
+        };
+        let (mantissa, exponent) = parts(largest);
+        // The largest mantissa is in [2¹⁶, 2¹⁷); rounded up to 2¹⁷ it would not fit and the next exponent is taken.
+        let exponent = exponent + 7 + (mantissa + 64 >> 24);
+        let mantissa = |x: f32| {
+            let (mantissa, own) = parts(x);
+            // Shifted by 25 or more, nothing is left.
+            let shift = (exponent - own).min(25);
+            let whole = (mantissa + (1 << (shift - 1))) >> shift;
+            let signed = if x < 0.0 { whole.wrapping_neg() } else { whole };
+            u64::from(signed & ((1 << MANTISSA) - 1))
+        };
+        Self::from_parts([mantissa(rgb.x), mantissa(rgb.y), mantissa(rgb.z)], exponent as i32 - 150)
+    }
+
+    /// The same for all there is.
+    #[cold]
+    fn of_any(rgb: Vec3) -> Self {
+        let largest = rgb.abs().max_element();
         if !rgb.is_finite() {
             return Self::INVALID;
         }
@@ -27,34 +57,49 @@ impl PackedRgb {
             return Self::default();
         }
         // Doubles hold every f32 times any power of two in question, so only the rounding to an integer is inexact.
-        // The largest mantissa is in [2¹⁶, 2¹⁷); rounded up to 2¹⁷ it would not fit and the next exponent is taken.
         let mut exponent = exponent_of(largest) - 16;
         if f64::from(largest) * power_of_two(-exponent) >= f64::from((1 << 17) - 1) + 0.5 {
             exponent += 1;
         }
         let scale = power_of_two(-exponent);
         let mantissa = |x: f32| u64::from(round(f64::from(x) * scale) as u32 & ((1 << MANTISSA) - 1));
-        let bits = mantissa(rgb.x)
-            | mantissa(rgb.y) << MANTISSA
-            | mantissa(rgb.z) << (2 * MANTISSA)
-            | ((exponent + EXPONENT_BIAS) as u64) << (3 * MANTISSA);
+        Self::from_parts([mantissa(rgb.x), mantissa(rgb.y), mantissa(rgb.z)], exponent)
+    }
+
+    #[inline]
+    fn from_parts([x, y, z]: [u64; 3], exponent: i32) -> Self {
+        let exponent = (exponent + EXPONENT_BIAS) as u64;
+        let bits = x | y << MANTISSA | z << (2 * MANTISSA) | exponent << (3 * MANTISSA);
         Self([bits as u32, (bits >> 32) as u32])
     }
 
     /// The numbers; NaN for [`PackedRgb::INVALID`].
     #[inline]
     pub fn get(self) -> Vec3 {
+        let bits = u64::from(self.0[1]) << 32 | u64::from(self.0[0]);
+        // Sign extension: the mantissa moves to the top and back.
+        let part = |at: u32| (((bits >> (at * MANTISSA)) as u32) << (32 - MANTISSA)) as i32 >> (32 - MANTISSA);
+        let parts = [part(0), part(1), part(2)];
+        let exponent = (bits >> (3 * MANTISSA)) as i32 - EXPONENT_BIAS;
+        if (-126..=127).contains(&exponent) {
+            // Exact: integers of 17 bits, and powers of two that f32 has.
+            let scale = f32::from_bits(((exponent + 127) as u32) << 23);
+            Vec3::from_array(parts.map(|x| x as f32 * scale))
+        } else if bits == 0 {
+            Vec3::ZERO
+        } else {
+            self.get_any(parts, exponent)
+        }
+    }
+
+    /// The same for all there is.
+    #[cold]
+    fn get_any(self, parts: [i32; 3], exponent: i32) -> Vec3 {
         if self == Self::INVALID {
             return Vec3::NAN;
         }
-        let bits = u64::from(self.0[1]) << 32 | u64::from(self.0[0]);
-        let scale = power_of_two((bits >> (3 * MANTISSA)) as i32 - EXPONENT_BIAS);
-        // Sign extension: the mantissa moves to the top and back.
-        let part = |at: u32| {
-            let mantissa = ((bits >> (at * MANTISSA)) as u32) << (32 - MANTISSA);
-            (f64::from(mantissa as i32 >> (32 - MANTISSA)) * scale) as f32
-        };
-        if bits == 0 { Vec3::ZERO } else { Vec3::new(part(0), part(1), part(2)) }
+        let scale = power_of_two(exponent);
+        Vec3::from_array(parts.map(|x| (f64::from(x) * scale) as f32))
     }
 }
 
@@ -178,6 +223,21 @@ mod tests {
             prop_assume!(Vec3::new(x, y, z).length() > 1e-3);
             let n = Vec3::new(x, y, z).normalize();
             prop_assert!(PackedNormal::new(n).get().dot(n) > 1.1f32.to_radians().cos());
+        }
+    }
+
+    #[test]
+    fn shifts_round_as_doubles_do() {
+        for seed in 0..200_000u64 {
+            let part = |k: u64| {
+                let bits = crate::hash::mix64(4 * seed + k) as u32;
+                // Exponents near each other in most of the cases, so that much is rounded.
+                f32::from_bits(if seed % 4 == 0 { bits } else { bits & 0x83ff_ffff | 0x3c00_0000 })
+            };
+            let rgb = Vec3::new(part(0), part(1), part(2));
+            if rgb.is_finite() {
+                assert_eq!(PackedRgb::new(rgb), PackedRgb::of_any(rgb), "{rgb}");
+            }
         }
     }
 

@@ -95,7 +95,9 @@ impl Pair {
 /// Sums of one slot that need no cell, in quanta: of 2⁻²⁴ units, up to 2³⁹ of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Own {
+    /// What paths bring through glossy lobes: of even samples and of odd ones.
     glossy: [[i64; 3]; 2],
+    /// What they bring that no cell could take: through diffuse lobes and through glossy ones.
     unfiltered: [[i64; 3]; 2],
 }
 
@@ -111,11 +113,48 @@ impl Own {
         let list = |at: usize| [words[at], words[at + 1], words[at + 2]];
         Self { glossy: [list(0), list(3)], unfiltered: [list(6), list(9)] }
     }
+}
 
+impl Own {
     /// Adds other sums.
     pub fn absorb(&mut self, other: &Self) {
         let (mine, others) = (self.to_words(), other.to_words());
         *self = Self::from_words(std::array::from_fn(|i| mine[i].saturating_add(others[i])));
+    }
+}
+
+/// Two sums for each of some slots, by slot.
+#[derive(Debug, Default)]
+struct SlotSums {
+    sums: Vec<(u32, [[i64; 3]; 2])>,
+    /// Where in it the last path's slot is.
+    last: usize,
+}
+
+impl SlotSums {
+    /// The sums of a slot.
+    fn at(&mut self, slot: u32) -> &mut [[i64; 3]; 2] {
+        // Paths of a slot come one after the other.
+        if self.sums.get(self.last).is_none_or(|(at, _)| *at != slot) {
+            self.last = self.sums.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
+                if self.sums.len() == self.sums.capacity() {
+                    self.sums.reserve_exact((self.sums.len() / 4).max(16));
+                }
+                self.sums.insert(at, (slot, Default::default()));
+                at
+            });
+        }
+        &mut self.sums[self.last].1
+    }
+
+    /// Adds to the sums of a slot.
+    fn absorb(&mut self, slot: u32, others: &[[i64; 3]; 2]) {
+        let sums = self.at(slot).as_flattened_mut();
+        sums.iter_mut().zip(others.as_flattened()).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
+    }
+
+    fn bytes(&self) -> usize {
+        self.sums.capacity() * size_of::<(u32, [[i64; 3]; 2])>()
     }
 }
 
@@ -125,10 +164,10 @@ pub(crate) struct Pairs {
     /// Sorted and without repetition up to `compact`, then as they came.
     pairs: Vec<Pair>,
     compact: usize,
-    /// By slot.
-    own: Vec<(u32, Own)>,
-    /// Where in it the last path's slot is.
-    last: usize,
+    /// See [`Own::glossy`], of slots that have some.
+    glossy: SlotSums,
+    /// See [`Own::unfiltered`], likewise: there are hardly any.
+    unfiltered: SlotSums,
 }
 
 impl Pairs {
@@ -158,24 +197,27 @@ impl Pairs {
 
     /// Adds what a path brings through glossy lobes.
     pub fn add_own(&mut self, slot: u32, odd: bool, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own(slot).glossy[usize::from(odd)], radiance, quantum);
+        add_quanta(&mut self.glossy.at(slot)[usize::from(odd)], radiance, quantum);
     }
 
     /// Adds what a path brings that no cell could take.
     pub fn add_unfiltered(&mut self, slot: u32, lobe: Lobe, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.own(slot).unfiltered[lobe as usize], radiance, quantum);
+        add_quanta(&mut self.unfiltered.at(slot)[lobe as usize], radiance, quantum);
     }
 
-    /// Sums of a slot.
-    fn own(&mut self, slot: u32) -> &mut Own {
-        // Paths of a slot come one after the other.
-        if self.own.get(self.last).is_none_or(|(at, _)| *at != slot) {
-            self.last = self.own.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
-                self.own.insert(at, (slot, Own::default()));
-                at
-            });
+    /// Sums of slots, by slot.
+    fn own(&self) -> Vec<(u32, Own)> {
+        let mut own = Vec::with_capacity(self.glossy.sums.len().max(self.unfiltered.sums.len()));
+        let mut unfiltered = self.unfiltered.sums.iter().copied().peekable();
+        for &(slot, glossy) in &self.glossy.sums {
+            while let Some((slot, unfiltered)) = unfiltered.next_if(|(at, _)| *at < slot) {
+                own.push((slot, Own { unfiltered, ..Own::default() }));
+            }
+            let same = unfiltered.next_if(|(at, _)| *at == slot).map(|(_, sums)| sums);
+            own.push((slot, Own { glossy, unfiltered: same.unwrap_or_default() }));
         }
-        &mut self.own[self.last].1
+        own.extend(unfiltered.map(|(slot, unfiltered)| (slot, Own { unfiltered, ..Own::default() })));
+        own
     }
 
     /// Ends a block.
@@ -198,8 +240,8 @@ impl Pairs {
     }
 
     /// Sums of slots that need no cell.
-    pub fn own_sums(&self) -> &[(u32, Own)] {
-        &self.own
+    pub fn own_sums(&self) -> Vec<(u32, Own)> {
+        self.own()
     }
 
     /// Adds others', whose cells have the numbers of the large tables.
@@ -211,14 +253,21 @@ impl Pairs {
     /// Adds others' own sums.
     pub fn absorb_own(&mut self, own: &[(u32, Own)]) {
         for (slot, sums) in own {
-            self.own(*slot).absorb(sums);
+            // A slot that has sums keeps them, even of zeros: what is stored again is what was stored.
+            self.glossy.absorb(*slot, &sums.glossy);
+            if sums.unfiltered != [[0; 3]; 2] {
+                self.unfiltered.absorb(*slot, &sums.unfiltered);
+            }
         }
     }
 
     fn compact(&mut self) {
-        self.pairs[self.compact..].sort_unstable_by_key(Pair::order);
-        // The stable sort finds the two sorted runs and merges them.
-        self.pairs.sort_by_key(Pair::order);
+        // Each block brings its slots in order: the stable sort finds those runs and merges them. Then there are a few pairs
+        // of each slot, most of them in order.
+        self.pairs.sort_by_key(Pair::slot);
+        for of_slot in self.pairs.chunk_by_mut(|a, b| a.slot() == b.slot()) {
+            of_slot.sort_unstable_by_key(Pair::order);
+        }
         Pair::unite(&mut self.pairs);
         self.compact = self.pairs.len();
         self.pairs.shrink_to(self.compact + self.compact / 2);
@@ -231,7 +280,7 @@ impl Pairs {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.pairs.capacity() * size_of::<Pair>() + self.own.capacity() * size_of::<(u32, Own)>()
+        self.pairs.capacity() * size_of::<Pair>() + self.glossy.bytes() + self.unfiltered.bytes()
     }
 
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
@@ -239,7 +288,7 @@ impl Pairs {
         self.compact();
         let mut gathered = Gathered::default();
         gathered.add(&self.pairs, quantum, |pair| read(pair.lobe(), pair.tree() as usize, pair.cell));
-        gathered.resolve(&self.own, quantum)
+        gathered.resolve(&self.own(), quantum)
     }
 }
 
@@ -253,7 +302,7 @@ pub(crate) struct Gathered(Vec<(u32, [[i128; 3]; 2])>);
 impl Gathered {
     /// Adds what sorted pairs read when `read` tells the estimate of a pair's cell. All pairs of a tree come at once.
     pub fn add(&mut self, pairs: &[Pair], quantum: &Quantum, read: impl Fn(&Pair) -> [f32; 3]) {
-        let scale = 2f64.powi(RESOLVED_BITS);
+        let scale = 2f64.powi(RESOLVED_BITS) / quantum.radiance();
         let sums = &mut self.0;
         let before = sums.len();
         // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
@@ -266,7 +315,7 @@ impl Gathered {
             }
             let Some((_, lobes)) = sums.last_mut() else { continue };
             for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(read(pair)) {
-                *sum += (throughput as f64 * f64::from(x) / quantum.radiance() * scale) as i128;
+                *sum += whole(throughput as f64 * f64::from(x) * scale);
             }
         }
         if before == 0 {
@@ -286,11 +335,8 @@ impl Gathered {
 
     /// What every slot gets, with its own sums.
     pub fn resolve(&self, own: &[(u32, Own)], quantum: &Quantum) -> Vec<(u32, Resolved)> {
-        let scale = 2f64.powi(RESOLVED_BITS);
-        let radiance = |sum: [i128; 3]| {
-            let unit = quantum.radiance() / scale * 2f64.powi(-THROUGHPUT_BITS);
-            (DVec3::from_array(sum.map(|x| x as f64)) * unit).as_vec3()
-        };
+        let unit = quantum.radiance() * 2f64.powi(-RESOLVED_BITS - THROUGHPUT_BITS);
+        let radiance = |sum: [i128; 3]| (DVec3::from_array(sum.map(float)) * unit).as_vec3();
         let own_radiance = |sum: [i64; 3]| {
             (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
         };
@@ -312,6 +358,18 @@ impl Gathered {
         slots.extend(own.map(|(slot, own)| (*slot, resolved(Default::default(), own))));
         slots
     }
+}
+
+/// ⌊x⌋ of a positive number; nearly all are short, for which there are instructions.
+#[inline]
+fn whole(x: f64) -> i128 {
+    if x.abs() < 2f64.powi(63) { i128::from(x as i64) } else { x as i128 }
+}
+
+/// Nearest number, likewise.
+#[inline]
+fn float(x: i128) -> f64 {
+    i64::try_from(x).map_or_else(|_| x as f64, |x| x as f64)
 }
 
 /// Quanta of the resolved sums per quantum of radiance times throughput, log₂: 2⁻¹⁰ of a rounding that f32 makes anyway.

@@ -32,11 +32,16 @@ impl Default for ShardedTable {
 }
 
 impl ShardedTable {
-    /// Adds deposits to their cells; places of the cells in the same order.
-    pub fn add(&self, deposits: &[(LeafCell, Deposit)]) -> Vec<ShardedIndex> {
-        let keys: Vec<CellKey> = deposits.iter().map(|(cell, _)| cell.key()).collect();
-        let batches = Buckets::new(SHARDS, keys.iter().map(|key| (key.hash() >> (64 - SHARD_BITS)) as u32));
-        let mut places = vec![ShardedIndex { shard: 0, number: 0 }; deposits.len()];
+    /// Adds deposits to their cells; says by the number of the deposit where those are, in any order.
+    pub fn add(&self, deposits: &[(LeafCell, Deposit)], mut found: impl FnMut(usize, ShardedIndex)) {
+        let keys: Vec<(CellKey, u64)> = deposits
+            .iter()
+            .map(|(cell, _)| {
+                let key = cell.key();
+                (key, key.hash())
+            })
+            .collect();
+        let batches = Buckets::new(SHARDS, keys.iter().map(|(_, hash)| (hash >> (64 - SHARD_BITS)) as u32));
         for (shard, lock) in (0..).zip(&self.shards) {
             let batch = batches.get(shard as usize);
             if batch.is_empty() {
@@ -44,12 +49,12 @@ impl ShardedTable {
             }
             let mut table = lock.lock().unwrap_or_else(PoisonError::into_inner);
             for &at in batch {
-                let number = table.cell(keys[at as usize]);
+                let (key, hash) = keys[at as usize];
+                let number = table.cell_of_hash(key, hash as u32);
                 table.add(number, &deposits[at as usize].1);
-                places[at as usize] = ShardedIndex { shard, number };
+                found(at as usize, ShardedIndex { shard, number });
             }
         }
-        places
     }
 
     /// The shards while nobody adds to them.
@@ -69,6 +74,9 @@ impl ShardedTable {
 }
 
 impl ShardedIndex {
+    /// The place of no cell.
+    pub const NONE: Self = Self { shard: u32::MAX, number: u32::MAX };
+
     /// The value of its cell among those of all.
     #[inline]
     pub fn of<T: Copy>(self, values: &[Vec<T>]) -> T {

@@ -83,8 +83,13 @@ impl Moments {
 }
 
 /// Nearest number; nearly all are short, for which there are instructions.
+#[inline]
 fn float(x: u128) -> f64 {
-    i64::try_from(x).map_or(x as f64, |x| x as f64)
+    #[cold]
+    fn long(x: u128) -> f64 {
+        x as f64
+    }
+    if x >> 63 == 0 { x as i64 as f64 } else { long(x) }
 }
 
 /// A cell of a level, leaf or not.
@@ -105,107 +110,191 @@ pub fn estimate<K: Key, T: Deref<Target = Table<K>> + Sync>(
     quantum: &Quantum,
     shrinkage: &Shrinkage,
 ) -> (Vec<Vec<[f32; 3]>>, u64) {
-    let levels = tables.par_iter().filter_map(|table| table.keys().map(CellKey::level).max());
-    let Some(coarsest) = levels.max().map(|level| level + shrinkage.levels as i32) else {
+    let keys: Vec<Vec<CellKey>> = tables.par_iter().map(|table| table.keys().collect()).collect();
+    let Some(coarsest) = keys.par_iter().flatten_iter().map(|key| key.level()).max() else {
         return (vec![Vec::new(); tables.len()], 0);
     };
+    let coarsest = coarsest + shrinkage.levels as i32;
     // Cells of different ancestors at the coarsest level know nothing of each other, so they can be worked on in
-    // buckets, which fit into caches and occupy all threads.
-    let cells: usize = tables.iter().map(|table| table.len()).sum();
+    // buckets, which fit into caches and occupy all threads. Most tables have cells in few of them.
+    let cells: usize = keys.iter().map(Vec::len).sum();
     let count = (cells / BUCKET).next_power_of_two();
-    let bucket = |key: CellKey| key.ancestor(coarsest).hash() as u32 & (count as u32 - 1);
-    let orders: Vec<Buckets> = tables.par_iter().map(|table| Buckets::new(count, table.keys().map(bucket))).collect();
-    let bucket_estimates = |bucket: usize| {
-        let places = tables
-            .iter()
-            .zip(&orders)
-            .flat_map(|(table, order)| order.get(bucket).iter().map(|&cell| (&**table, cell)));
-        estimate_bucket(&places.collect::<Vec<_>>(), coarsest, quantum, shrinkage)
+    let bucket = |key: &CellKey| key.ancestor(coarsest).hash() as u32 & (count as u32 - 1);
+    let orders: Vec<Runs> = keys.par_iter().map(|keys| Runs::new(keys.iter().map(bucket))).collect();
+    let sizes = orders.iter().map(|order| order.runs.len());
+    let numbered = sizes.enumerate().flat_map(|(table, runs)| (0..runs).map(move |run| (table as u32, run as u32)));
+    let numbered: Vec<(u32, u32)> = numbered.collect();
+    let run = |(table, run): (u32, u32)| &orders[table as usize].runs[run as usize];
+    let by_bucket = Buckets::new(count, numbered.iter().map(|at| run(*at).bucket));
+    let work = |room: &mut Room, bucket: usize| {
+        room.cells.clear();
+        for (number, at) in by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]) {
+            let (table, keys) = (&tables[number as usize], &keys[number as usize]);
+            let items = orders[number as usize].items(at).iter();
+            room.cells.extend(items.map(|&cell| (keys[cell as usize], table.sums(cell))));
+        }
+        room.estimate(coarsest, quantum, shrinkage)
     };
     let (estimates, different): (Vec<Vec<[f32; 3]>>, Vec<u64>) =
-        (0..count).into_par_iter().map(bucket_estimates).unzip();
-    // Where the cells of each table begin in each bucket.
-    let mut begins = vec![vec![0; count]];
-    for order in &orders {
-        let last = &begins[begins.len() - 1];
-        begins.push((0..count).map(|bucket| last[bucket] + order.get(bucket).len()).collect());
+        (0..count).into_par_iter().map_init(Room::default, work).unzip();
+    // Where the estimates of each run begin in those of its bucket.
+    let mut begins: Vec<Vec<u32>> = orders.iter().map(|order| vec![0; order.runs.len()]).collect();
+    for bucket in 0..count {
+        let mut next = 0;
+        for (table, at) in by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]) {
+            begins[table as usize][at as usize] = next;
+            next += orders[table as usize].items(at).len() as u32;
+        }
     }
-    let by_table = |((table, order), begins): ((&T, &Buckets), &Vec<usize>)| {
-        let mut of_table = vec![[0.0; 3]; table.len()];
-        for (bucket, estimates) in estimates.iter().enumerate() {
-            for (&cell, estimate) in order.get(bucket).iter().zip(&estimates[begins[bucket]..]) {
-                of_table[cell as usize] = *estimate;
+    let by_table = |(order, begins): (&Runs, &Vec<u32>)| {
+        let mut of_table = vec![[0.0; 3]; order.cells.len()];
+        for ((at, run), begin) in (0..).zip(&order.runs).zip(begins) {
+            let found = &estimates[run.bucket as usize][*begin as usize..];
+            for (cell, estimate) in order.items(at).iter().zip(found) {
+                of_table[*cell as usize] = *estimate;
             }
         }
         of_table
     };
-    (tables.par_iter().zip(&orders).zip(&begins).map(by_table).collect(), different.iter().sum())
+    (orders.par_iter().zip(&begins).map(by_table).collect(), different.iter().sum())
 }
 
 /// Cells of a bucket: few enough that their nodes stay in a core's cache, enough that a bucket is worth a task.
 const BUCKET: usize = 2048;
 
-/// Estimates of the cells at the given places, and how many different cells they are.
-fn estimate_bucket<K: Key>(
-    places: &[(&Table<K>, u32)],
-    coarsest: i32,
-    quantum: &Quantum,
-    shrinkage: &Shrinkage,
-) -> (Vec<[f32; 3]>, u64) {
-    let mut order: Vec<(CellKey, u32)> = places.iter().map(|(table, cell)| table.key(*cell)).zip(0..).collect();
-    order.sort_unstable();
-    let leaves: Vec<Node> = order
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(|same| {
-            let mut sums = WideSums::default();
-            for (table, cell) in same.iter().map(|(_, at)| &places[*at as usize]) {
-                sums.merge(&table.sums(*cell));
-            }
-            let moments = Moments::of(&sums, quantum);
-            Node { key: same[0].0, moments, estimate: moments.mean(), leaf: true }
-        })
-        .collect();
-    let mut estimates = vec![[0.0; 3]; places.len()];
-    let levels = estimate_levels(&leaves, coarsest, shrinkage);
-    // Both in the order of keys.
-    let nodes = levels.iter().flatten().filter(|node| node.leaf);
-    for (node, same) in nodes.zip(order.chunk_by(|a, b| a.0 == b.0)) {
-        let estimate = node.estimate.as_vec3().to_array();
-        same.iter().for_each(|(_, at)| estimates[*at as usize] = estimate);
-    }
-    (estimates, leaves.len() as u64)
+/// The cells of a table by their buckets.
+struct Runs {
+    cells: Vec<u32>,
+    runs: Vec<Run>,
 }
 
-/// The nodes of all levels of the trees above `leaves`, which are sorted, with their estimates.
-fn estimate_levels(leaves: &[Node], coarsest: i32, shrinkage: &Shrinkage) -> Vec<Vec<Node>> {
-    // From fine to coarse: each level is the parents of the one before, and the leaves of its own.
-    let mut levels: Vec<Vec<Node>> = Vec::new();
-    let mut inner: Vec<Node> = Vec::new();
-    let mut rest = leaves;
-    let finest = leaves.first().map_or(coarsest, |leaf| leaf.key.level());
-    for level in finest..=coarsest {
-        let (own, coarser) = rest.split_at(rest.partition_point(|leaf| leaf.key.level() == level));
-        rest = coarser;
-        let nodes = merged(&inner, own);
-        inner = parents(&nodes);
-        levels.push(nodes);
+/// Cells of a table in one bucket.
+struct Run {
+    bucket: u32,
+    /// Where in the list they begin.
+    begin: u32,
+}
+
+impl Runs {
+    /// From the bucket of each cell.
+    fn new(buckets: impl Iterator<Item = u32>) -> Self {
+        let mut order: Vec<u64> = buckets.zip(0..).map(|(bucket, cell)| u64::from(bucket) << 32 | cell).collect();
+        order.sort_unstable();
+        let mut runs: Vec<Run> = Vec::new();
+        for (begin, item) in (0..).zip(&order) {
+            let bucket = (item >> 32) as u32;
+            if runs.last().is_none_or(|run| run.bucket != bucket) {
+                runs.push(Run { bucket, begin });
+            }
+        }
+        Self { cells: order.into_iter().map(|item| item as u32).collect(), runs }
     }
 
-    // From coarse to fine.
-    for level in (0..levels.len() - 1).rev() {
-        let (fine, coarse) = levels.split_at_mut(level + 1);
-        // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
-        let parents = coarse[0].iter().filter(|node| !node.leaf);
-        for (siblings, parent) in fine[level].chunk_by_mut(|a, b| a.key.parent() == b.key.parent()).zip(parents) {
-            shrink(siblings, parent, shrinkage);
+    /// The cells of a run.
+    fn items(&self, run: u32) -> &[u32] {
+        let run = run as usize;
+        let end = self.runs.get(run + 1).map_or(self.cells.len(), |next| next.begin as usize);
+        &self.cells[self.runs[run].begin as usize..end]
+    }
+}
+
+/// Room for the cells of a bucket, to be used again.
+#[derive(Default)]
+struct Room {
+    /// The cells as they come.
+    cells: Vec<(CellKey, WideSums)>,
+    /// Different upper halves of their keys.
+    upper: Vec<u64>,
+    /// Lower halves of the keys of those of one upper half.
+    lower: Vec<(u64, u32)>,
+    /// Places of the cells in the order of their keys.
+    order: Vec<u32>,
+    /// Different cells in the order of their keys.
+    leaves: Vec<Node>,
+    /// The nodes of all levels of the trees above them, from fine to coarse.
+    levels: Vec<Vec<Node>>,
+    /// Those of a level that are no leaves.
+    inner: Vec<Node>,
+}
+
+impl Room {
+    /// Estimates of the cells, and how many different cells they are.
+    fn estimate(&mut self, coarsest: i32, quantum: &Quantum, shrinkage: &Shrinkage) -> (Vec<[f32; 3]>, u64) {
+        self.sort();
+        let cell = |at: u32| &self.cells[at as usize];
+        let leaf = |same: &[u32]| {
+            let (key, mut sums) = *cell(same[0]);
+            same[1..].iter().for_each(|&other| sums.merge(&cell(other).1));
+            let moments = Moments::of(&sums, quantum);
+            Node { key, moments, estimate: moments.mean(), leaf: true }
+        };
+        self.leaves.clear();
+        self.leaves.extend(self.order.chunk_by(|&a, &b| cell(a).0 == cell(b).0).map(leaf));
+        let different = self.leaves.len() as u64;
+        self.estimate_levels(coarsest, shrinkage);
+        let mut estimates = vec![[0.0; 3]; self.cells.len()];
+        // Both in the order of keys.
+        let nodes = self.levels.iter().flatten().filter(|node| node.leaf);
+        let cell = |at: u32| &self.cells[at as usize];
+        for (node, same) in nodes.zip(self.order.chunk_by(|&a, &b| cell(a).0 == cell(b).0)) {
+            let estimate = node.estimate.as_vec3().to_array();
+            same.iter().for_each(|&other| estimates[other as usize] = estimate);
+        }
+        (estimates, different)
+    }
+
+    /// Finds the order of the cells.
+    fn sort(&mut self) {
+        let Self { cells, upper, lower, order, .. } = self;
+        // Of the upper halves there are few: those are numbered, so that what remains to be sorted is short.
+        upper.clear();
+        for (key, _) in &*cells {
+            if upper.last() != Some(&key.upper()) && !upper.contains(&key.upper()) {
+                upper.push(key.upper());
+            }
+        }
+        upper.sort_unstable();
+        let group = |key: CellKey| upper.partition_point(|half| *half < key.upper()) as u32;
+        let groups = Buckets::new(upper.len(), cells.iter().map(|(key, _)| group(*key)));
+        order.clear();
+        for group in 0..upper.len() {
+            lower.clear();
+            lower.extend(groups.get(group).iter().map(|&at| (cells[at as usize].0.lower(), at)));
+            lower.sort_unstable_by_key(|(lower, _)| *lower);
+            order.extend(lower.iter().map(|(_, at)| *at));
         }
     }
-    levels
+
+    /// Makes the levels of the trees above the leaves, with their estimates.
+    fn estimate_levels(&mut self, coarsest: i32, shrinkage: &Shrinkage) {
+        let Self { leaves, levels, inner, .. } = self;
+        // From fine to coarse: each level is the parents of the one before, and the leaves of its own.
+        let finest = leaves.first().map_or(coarsest, |leaf| leaf.key.level());
+        levels.iter_mut().for_each(Vec::clear);
+        levels.resize_with((coarsest - finest + 1) as usize, Vec::new);
+        inner.clear();
+        let mut rest = leaves.as_slice();
+        for (level, nodes) in (finest..).zip(&mut *levels) {
+            let (own, coarser) = rest.split_at(rest.partition_point(|leaf| leaf.key.level() == level));
+            rest = coarser;
+            merge(inner, own, nodes);
+            parents(nodes, inner);
+        }
+
+        // From coarse to fine.
+        for level in (0..levels.len() - 1).rev() {
+            let (fine, coarse) = levels.split_at_mut(level + 1);
+            // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
+            let parents = coarse[0].iter().filter(|node| !node.leaf);
+            for (siblings, parent) in fine[level].chunk_by_mut(|a, b| a.key.parent() == b.key.parent()).zip(parents) {
+                shrink(siblings, parent, shrinkage);
+            }
+        }
+    }
 }
 
 /// Two sorted lists as one. A cell may be in both: some of its deposits were finer than others, and the two are siblings.
-fn merged(inner: &[Node], leaves: &[Node]) -> Vec<Node> {
-    let mut nodes = Vec::with_capacity(inner.len() + leaves.len());
+fn merge(inner: &[Node], leaves: &[Node], nodes: &mut Vec<Node>) {
     let mut leaves = leaves.iter().peekable();
     for node in inner {
         while let Some(leaf) = leaves.next_if(|leaf| leaf.key < node.key) {
@@ -214,12 +303,11 @@ fn merged(inner: &[Node], leaves: &[Node]) -> Vec<Node> {
         nodes.push(*node);
     }
     nodes.extend(leaves);
-    nodes
 }
 
 /// The parents of a level's cells, in order.
-fn parents(nodes: &[Node]) -> Vec<Node> {
-    let mut parents: Vec<Node> = Vec::with_capacity(nodes.len() / 2);
+fn parents(nodes: &[Node], parents: &mut Vec<Node>) {
+    parents.clear();
     for node in nodes {
         let key = node.key.parent();
         match parents.last_mut() {
@@ -227,10 +315,9 @@ fn parents(nodes: &[Node]) -> Vec<Node> {
             _ => parents.push(Node { key, leaf: false, ..*node }),
         }
     }
-    for parent in &mut parents {
+    for parent in parents {
         parent.estimate = parent.moments.mean();
     }
-    parents
 }
 
 /// Sets the estimates of all children of `parent`.

@@ -58,9 +58,10 @@ impl Quantum {
         let whole = |x: f64| (x + 0.5) as i64 as u64;
         let square = luminance * luminance * self.square * share + 0.5;
         Some(Deposit {
-            weight: weight.into(),
+            weight,
             rgb: (radiance * (self.rgb * share)).to_array().map(whole),
-            square: if square < LIMIT as f64 { (square as i64 as u64).into() } else { square as u128 },
+            square: if square < LIMIT as f64 { square as i64 as u64 } else { square as u128 as u64 },
+            square_above: if square < LIMIT as f64 { 0 } else { (square as u128 >> 64) as u32 },
         })
     }
 
@@ -83,23 +84,51 @@ impl Quantum {
 /// What one path brings to a cell, in quanta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deposit {
-    weight: u64,
     rgb: [u64; 3],
-    square: u128,
+    /// Up to 2⁸⁰: the lower 64 bits and those above.
+    square: u64,
+    square_above: u32,
+    weight: u32,
 }
 
-/// The sums of a cell, 48 bytes, each below 2⁶³. What does not fit is handed to [`WideSums`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sums {
-    /// Deposits.
-    pub count: u64,
-    /// Σ weight.
-    pub weight: u64,
-    /// Σ weight · radiance.
-    pub rgb: [u64; 3],
-    /// Σ weight · luminance².
-    pub square: u64,
+impl Deposit {
+    /// Whether its square is small enough for a cell's own sums.
+    #[inline]
+    fn narrow(&self) -> bool {
+        self.square_above == 0 && self.square < LIMIT
+    }
 }
+
+/// Sums of a cell that hold what cells usually hold; more is handed to [`WideSums`].
+pub trait CellSums: Copy + Default + std::fmt::Debug + Send + Sync {
+    /// Adds a deposit; false, and unchanged, if it does not fit.
+    #[must_use]
+    fn add(&mut self, deposit: &Deposit) -> bool;
+    /// Adds other sums; false, and unchanged, if they do not fit.
+    #[must_use]
+    fn merge(&mut self, sums: &WideSums) -> bool;
+    /// The same sums without a limit.
+    fn wide(&self) -> WideSums;
+}
+
+/// The sums of a cell, 48 bytes, each below 2⁶³.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sums(
+    /// Deposits, Σ weight, Σ weight · radiance, Σ weight · luminance².
+    [u64; 6],
+);
+
+/// The sums of a cell all of whose deposits have weight 1, 40 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PlainSums {
+    /// Σ radiance, Σ luminance²: each below 2⁶³.
+    words: [u64; 4],
+    /// Deposits.
+    count: u32,
+}
+
+/// Weight 1 in quanta.
+const PLAIN_WEIGHT: u32 = 1 << WEIGHT_BITS;
 
 /// The same sums without a limit: 2⁴⁰ of the largest deposits fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -114,36 +143,71 @@ pub struct WideSums {
     pub square: u128,
 }
 
+impl CellSums for Sums {
+    #[inline]
+    fn add(&mut self, deposit: &Deposit) -> bool {
+        let Deposit { rgb: [r, g, b], square, weight, .. } = *deposit;
+        deposit.narrow() && self.add_words([1, weight.into(), r, g, b, square])
+    }
+
+    fn merge(&mut self, sums: &WideSums) -> bool {
+        // All that fits is below 2⁶³.
+        sums.words().is_some_and(|words| self.add_words(words))
+    }
+
+    #[inline]
+    fn wide(&self) -> WideSums {
+        let Self([count, weight, r, g, b, square]) = *self;
+        WideSums { count, weight, rgb: [r, g, b].map(u128::from), square: square.into() }
+    }
+}
+
 impl Sums {
-    /// Adds a deposit; false, and unchanged, if it does not fit.
     #[inline]
-    #[must_use]
-    pub fn add(&mut self, deposit: &Deposit) -> bool {
-        if deposit.square >= u128::from(LIMIT) {
-            return false;
-        }
-        let square = deposit.square as u64;
-        self.merge(&Self { count: 1, weight: deposit.weight, rgb: deposit.rgb, square })
-    }
-
-    /// Adds other sums; false, and unchanged, if they do not fit.
-    #[inline]
-    #[must_use]
-    pub fn merge(&mut self, other: &Self) -> bool {
-        let (a, b) = (self.to_array(), other.to_array());
+    fn add_words(&mut self, words: [u64; 6]) -> bool {
         // Both below 2⁶³, so nothing wraps, and the top bits say what has grown too large.
-        let sum: [u64; 6] = std::array::from_fn(|i| a[i].wrapping_add(b[i]));
-        if sum.iter().fold(0, |bits, x| bits | x) >= LIMIT {
-            return false;
+        let sum: [u64; 6] = std::array::from_fn(|i| self.0[i].wrapping_add(words[i]));
+        let fits = sum.iter().fold(0, |bits, x| bits | x) < LIMIT;
+        if fits {
+            self.0 = sum;
         }
-        let [count, weight, r, g, b, square] = sum;
-        *self = Self { count, weight, rgb: [r, g, b], square };
-        true
+        fits
+    }
+}
+
+impl CellSums for PlainSums {
+    #[inline]
+    fn add(&mut self, deposit: &Deposit) -> bool {
+        let Deposit { rgb: [r, g, b], square, weight, .. } = *deposit;
+        deposit.narrow() && weight == PLAIN_WEIGHT && self.add_words([r, g, b, square], 1)
+    }
+
+    fn merge(&mut self, sums: &WideSums) -> bool {
+        let plain = sums.count.checked_mul(PLAIN_WEIGHT.into()) == Some(sums.weight);
+        let count = u32::try_from(sums.count).ok().filter(|_| plain);
+        let Some((count, [_, _, words @ ..])) = count.zip(sums.words()) else { return false };
+        self.add_words(words, count)
     }
 
     #[inline]
-    fn to_array(self) -> [u64; 6] {
-        [self.count, self.weight, self.rgb[0], self.rgb[1], self.rgb[2], self.square]
+    fn wide(&self) -> WideSums {
+        let [r, g, b, square] = self.words.map(u128::from);
+        let count = u64::from(self.count);
+        WideSums { count, weight: count * u64::from(PLAIN_WEIGHT), rgb: [r, g, b], square }
+    }
+}
+
+impl PlainSums {
+    #[inline]
+    fn add_words(&mut self, words: [u64; 4], count: u32) -> bool {
+        // As above.
+        let sum: [u64; 4] = std::array::from_fn(|i| self.words[i].wrapping_add(words[i]));
+        let (count, overflow) = self.count.overflowing_add(count);
+        let fits = !overflow && sum.iter().fold(0, |bits, x| bits | x) < LIMIT;
+        if fits {
+            (self.words, self.count) = (sum, count);
+        }
+        fits
     }
 }
 
@@ -151,7 +215,15 @@ impl WideSums {
     /// Adds a deposit.
     pub fn add(&mut self, deposit: &Deposit) {
         let rgb = deposit.rgb.map(u128::from);
-        self.merge(&Self { count: 1, weight: deposit.weight, rgb, square: deposit.square });
+        let square = u128::from(deposit.square_above) << 64 | u128::from(deposit.square);
+        self.merge(&Self { count: 1, weight: deposit.weight.into(), rgb, square });
+    }
+
+    /// Count, weight, radiance and square if all are below 2⁶³.
+    pub fn words(&self) -> Option<[u64; 6]> {
+        let [r, g, b] = self.rgb;
+        let words = [self.count.into(), self.weight.into(), r, g, b, self.square];
+        words.iter().all(|x| *x < LIMIT.into()).then(|| words.map(|x| x as u64))
     }
 
     /// Adds other sums. What others have stored may be of any size.
@@ -162,25 +234,6 @@ impl WideSums {
             *sum = sum.saturating_add(x);
         }
         self.square = self.square.saturating_add(other.square);
-    }
-}
-
-impl TryFrom<&WideSums> for Sums {
-    type Error = std::num::TryFromIntError;
-
-    fn try_from(wide: &WideSums) -> Result<Self, Self::Error> {
-        // All that fits is below 2⁶³.
-        let narrow = |x: u128| i64::try_from(x).map(|x| x as u64);
-        let [r, g, b] = wide.rgb.map(narrow);
-        let (count, weight) = (narrow(wide.count.into())?, narrow(wide.weight.into())?);
-        Ok(Self { count, weight, rgb: [r?, g?, b?], square: narrow(wide.square)? })
-    }
-}
-
-impl From<&Sums> for WideSums {
-    fn from(sums: &Sums) -> Self {
-        let Sums { count, weight, rgb, square } = *sums;
-        Self { count, weight, rgb: rgb.map(u128::from), square: square.into() }
     }
 }
 
@@ -214,25 +267,39 @@ mod tests {
             wide.merge(&copy);
         }
         assert_eq!(wide.count, 1 << 33);
-        assert_eq!(wide.weight, deposit.weight << 33);
+        assert_eq!(wide.weight, u64::from(deposit.weight) << 33);
         assert_eq!(wide.rgb, [u128::from(deposit.rgb[0]) << 33; 3]);
-        assert_eq!(wide.square, deposit.square << 33);
+        assert_eq!(wide.square, 1 << (36 + 40 + 4 + 33));
+    }
+
+    fn fill<S: CellSums + PartialEq>() {
+        let quantum = Quantum::new(1.0);
+        let deposit = quantum.deposit(Vec3::splat(10_000.0), 1.0).unwrap();
+        let (mut sums, mut expected) = (S::default(), WideSums::default());
+        while sums.add(&deposit) {
+            expected.add(&deposit);
+        }
+        assert!(expected.count > 0);
+        assert_eq!(sums.wide(), expected);
+        let before = sums;
+        assert!(!sums.merge(&before.wide()));
+        assert_eq!(sums, before);
     }
 
     #[test]
     fn sums_that_do_not_fit_are_left_alone() {
+        fill::<Sums>();
+        fill::<PlainSums>();
+    }
+
+    #[test]
+    fn plain_sums_take_what_has_weight_one() {
         let quantum = Quantum::new(1.0);
-        let deposit = quantum.deposit(Vec3::splat(10_000.0), 1.0).unwrap();
-        let (mut sums, mut accepted) = (Sums::default(), 0u64);
-        while sums.add(&deposit) {
-            accepted += 1;
-        }
-        assert_eq!(sums.count, accepted);
-        assert!(accepted > 0);
-        let before = sums;
-        let copy = sums;
-        assert!(!sums.merge(&copy));
-        assert_eq!(sums, before);
+        let (mut plain, mut any) = (PlainSums::default(), Sums::default());
+        let [one, half] = [1.0, 0.5].map(|weight| quantum.deposit(Vec3::splat(3.0), weight).unwrap());
+        assert!(plain.add(&one) && any.add(&one) && !plain.add(&half) && any.add(&half));
+        assert!(!plain.merge(&any.wide()) && plain.merge(&plain.wide()));
+        assert_eq!((plain.wide().count, plain.wide().weight), (2, 2 << WEIGHT_BITS));
     }
 
     proptest! {

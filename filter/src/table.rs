@@ -3,17 +3,20 @@
 use std::collections::BTreeMap;
 
 use crate::grid::{CellKey, LeafCell};
-use crate::sums::{Deposit, Sums, WideSums};
+use crate::sums::{CellSums, Deposit, PlainSums, Sums, WideSums};
 
 /// What cells are found by.
-pub(crate) trait Key: Copy + Eq {
-    /// Bits that differ between keys.
+pub(crate) trait Key: Copy + Eq + Default + Send + Sync {
+    /// What a cell adds up.
+    type Sums: CellSums;
+    /// Bits that differ between keys, of which the lower 32 count.
     fn hash(&self) -> u64;
     /// The key that cells are sorted by.
     fn cell_key(&self) -> CellKey;
 }
 
 impl Key for CellKey {
+    type Sums = Sums;
     #[inline]
     fn hash(&self) -> u64 {
         CellKey::hash(*self)
@@ -25,6 +28,7 @@ impl Key for CellKey {
 }
 
 impl Key for LeafCell {
+    type Sums = PlainSums;
     #[inline]
     fn hash(&self) -> u64 {
         self.quick_hash()
@@ -35,36 +39,42 @@ impl Key for LeafCell {
     }
 }
 
-/// A cell, 64 bytes.
-#[derive(Clone, Copy, Debug)]
-struct Cell<K> {
+/// A cell, 64 bytes; 56 if all its deposits have the same weight.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell<K: Key> {
     key: K,
-    sums: Sums,
+    sums: K::Sums,
 }
+
+/// Cells are allocated by so many: they never move, and a table of a few hundred wastes little.
+const CHUNK: usize = 16;
 
 /// Cells found by key: open addressing with linear probing over full keys. It grows, so no cell is ever refused, and
 /// nothing depends on who came first but the cells' numbers, which no result may depend on.
 #[derive(Debug)]
-pub(crate) struct Table<K> {
-    /// Number of the cell plus one, 0 for none; a power of two of slots, at most half of them taken.
+pub(crate) struct Table<K: Key> {
+    /// 0 for none, or in the lower bits, as many as index this list, the number of the cell plus one, and above them the
+    /// hash of its key: what another cell has taken is passed over without a look at that cell. A power of two of slots,
+    /// at most half of them taken.
     slots: Vec<u32>,
-    cells: Vec<Cell<K>>,
+    chunks: Vec<Box<[Cell<K>; CHUNK]>>,
+    len: usize,
     /// What did not fit into cells, by their numbers.
     wide: BTreeMap<u32, WideSums>,
 }
 
-impl<K> Default for Table<K> {
+impl<K: Key> Default for Table<K> {
     fn default() -> Self {
-        Self { slots: Vec::new(), cells: Vec::new(), wide: BTreeMap::new() }
+        Self { slots: Vec::new(), chunks: Vec::new(), len: 0, wide: BTreeMap::new() }
     }
 }
 
 impl<K: Key> Table<K> {
     /// A table of cells that are all different.
     pub fn from_cells(cells: Vec<(K, WideSums)>) -> Self {
-        let mut table = Self { cells: Vec::with_capacity(cells.len()), ..Self::default() };
-        for ((key, sums), number) in cells.into_iter().zip(0..) {
-            table.cells.push(Cell { key, sums: Sums::default() });
+        let mut table = Self::default();
+        for (key, sums) in cells {
+            let number = table.push(key);
             table.merge(number, &sums);
         }
         table
@@ -73,53 +83,96 @@ impl<K: Key> Table<K> {
     /// Number of the cell of `key`, which is made if there is none.
     #[inline]
     pub fn cell(&mut self, key: K) -> u32 {
-        if 2 * self.cells.len() >= self.slots.len() {
+        self.cell_of_hash(key, key.hash() as u32)
+    }
+
+    /// The same when the hash is known.
+    #[inline]
+    pub fn cell_of_hash(&mut self, key: K, hash: u32) -> u32 {
+        if 2 * self.len >= self.slots.len() {
             self.grow();
         }
-        let mask = self.slots.len() - 1;
-        let mut at = key.hash() as usize & mask;
+        let mask = (self.slots.len() - 1) as u32;
+        let mut at = hash & mask;
         loop {
-            match self.slots[at] {
-                0 => break,
-                number if self.cells[number as usize - 1].key == key => return number - 1,
-                _ => at = (at + 1) & mask,
+            let slot = self.slots[at as usize];
+            if slot == 0 {
+                return self.make(key, at, hash & !mask);
             }
+            if (slot ^ hash) & !mask == 0 {
+                let number = (slot & mask) - 1;
+                if self.at(number).key == key {
+                    return number;
+                }
+            }
+            at = (at + 1) & mask;
         }
-        if self.cells.len() == self.cells.capacity() {
-            // Most of the filter's memory is in these lists: they grow by a quarter where doubling would waste half.
-            self.cells.reserve_exact((self.cells.len() / 4).max(16));
+    }
+
+    /// Brings the table into the cache, all of it in the order of its memory: much sooner done than one cell after the
+    /// other when they are looked for.
+    pub fn warm(&self) {
+        const LINE: usize = 64 / size_of::<u32>();
+        let slots = self.slots.iter().step_by(LINE).fold(0, |sum, slot| sum ^ slot);
+        let cells = self.cells().fold(0, |sum, cell| sum ^ cell.key.hash());
+        std::hint::black_box((slots, cells));
+    }
+
+    /// Makes a cell, to be found by a slot.
+    fn make(&mut self, key: K, slot: u32, tag: u32) -> u32 {
+        let number = self.push(key);
+        self.slots[slot as usize] = tag | (number + 1);
+        number
+    }
+
+    /// Makes a cell that no slot finds yet.
+    fn push(&mut self, key: K) -> u32 {
+        if self.len == CHUNK * self.chunks.len() {
+            self.chunks.push(Box::new([Cell::default(); CHUNK]));
         }
-        self.cells.push(Cell { key, sums: Sums::default() });
-        self.slots[at] = self.cells.len() as u32;
-        self.cells.len() as u32 - 1
+        let number = self.len as u32;
+        self.len += 1;
+        *self.at_mut(number) = Cell { key, sums: K::Sums::default() };
+        number
     }
 
     #[cold]
     fn grow(&mut self) {
         // Twice as long, or as long as it takes where there never were slots.
-        let length = (2 * self.slots.len()).max(2 * (self.cells.len() + 1)).max(64).next_power_of_two();
+        let length = (2 * self.slots.len()).max(2 * (self.len + 1)).max(64).next_power_of_two();
+        let mask = length as u32 - 1;
         self.slots = vec![0; length];
-        for (cell, number) in self.cells.iter().zip(1..) {
-            let mut at = cell.key.hash() as usize & (length - 1);
-            while self.slots[at] != 0 {
-                at = (at + 1) & (length - 1);
+        for number in 0..self.len as u32 {
+            let hash = self.at(number).key.hash() as u32;
+            let mut at = hash & mask;
+            while self.slots[at as usize] != 0 {
+                at = (at + 1) & mask;
             }
-            self.slots[at] = number;
+            self.slots[at as usize] = hash & !mask | (number + 1);
         }
+    }
+
+    #[inline]
+    fn at(&self, cell: u32) -> &Cell<K> {
+        &self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
+    }
+
+    #[inline]
+    fn at_mut(&mut self, cell: u32) -> &mut Cell<K> {
+        &mut self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
     }
 
     /// Adds a deposit to a cell.
     #[inline]
     pub fn add(&mut self, cell: u32, deposit: &Deposit) {
-        if !self.cells[cell as usize].sums.add(deposit) {
+        if !self.at_mut(cell).sums.add(deposit) {
             self.widen(cell).add(deposit);
         }
     }
 
     /// Adds sums to a cell.
     pub fn merge(&mut self, cell: u32, sums: &WideSums) {
-        let fits = Sums::try_from(sums).is_ok_and(|sums| self.cells[cell as usize].sums.merge(&sums));
-        if !fits {
+        if !self.at_mut(cell).sums.merge(sums) {
             self.widen(cell).merge(sums);
         }
     }
@@ -127,32 +180,33 @@ impl<K: Key> Table<K> {
     /// Moves a cell's sums to its wide ones, and returns those.
     #[cold]
     fn widen(&mut self, cell: u32) -> &mut WideSums {
-        let sums = std::mem::take(&mut self.cells[cell as usize].sums);
+        let sums = std::mem::take(&mut self.at_mut(cell).sums);
         let wide = self.wide.entry(cell).or_default();
-        wide.merge(&(&sums).into());
+        wide.merge(&sums.wide());
         wide
     }
 
-    /// Number of cells.
-    pub fn len(&self) -> usize {
-        self.cells.len()
+    fn cells(&self) -> impl Iterator<Item = &Cell<K>> + '_ {
+        self.chunks.iter().flat_map(|chunk| chunk.iter()).take(self.len)
     }
 
     /// All keys, in the order of their cells' numbers.
     pub fn keys(&self) -> impl Iterator<Item = CellKey> + '_ {
-        self.cells.iter().map(|cell| cell.key.cell_key())
+        self.cells().map(|cell| cell.key.cell_key())
     }
 
     /// Key of a cell.
     pub fn key(&self, cell: u32) -> CellKey {
-        self.cells[cell as usize].key.cell_key()
+        self.at(cell).key.cell_key()
     }
 
     /// Sums of a cell.
     pub fn sums(&self, cell: u32) -> WideSums {
-        let mut sums = WideSums::from(&self.cells[cell as usize].sums);
-        if let Some(wide) = self.wide.get(&cell) {
-            sums.merge(wide);
+        let mut sums = self.at(cell).sums.wide();
+        if !self.wide.is_empty() {
+            if let Some(wide) = self.wide.get(&cell) {
+                sums.merge(wide);
+            }
         }
         sums
     }
@@ -160,12 +214,13 @@ impl<K: Key> Table<K> {
     /// Forgets all cells, and keeps the memory.
     pub fn clear(&mut self) {
         self.slots.fill(0);
-        self.cells.clear();
+        self.len = 0;
         self.wide.clear();
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.slots.capacity() * size_of::<u32>() + self.cells.capacity() * size_of::<Cell<K>>()
+        let chunk = size_of::<Box<[Cell<K>; CHUNK]>>() * self.chunks.capacity();
+        self.slots.capacity() * size_of::<u32>() + self.chunks.len() * CHUNK * size_of::<Cell<K>>() + chunk
     }
 }

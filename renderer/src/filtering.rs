@@ -12,12 +12,13 @@ use std::ops::Range;
 use filter::talk::{self, Talk};
 use filter::{Adaptive, Anchor, Branch, PathRecord, Resolved, Slots, StoredError};
 use glam::{Mat3, Vec3};
+use rayon::prelude::*;
 
 pub use blend::Blend;
 pub use settings::SettingError;
 pub use tile::{Keep, Keeper, Nothing, Paths, Selection, Watching};
 
-use crate::film::{Aov, AovSet, Film, FilterMap, Layer};
+use crate::film::{Aov, AovSet, Film, FilterMap, Layer, TILE};
 use crate::math::Rgb;
 
 /// How a frame is filtered.
@@ -95,6 +96,9 @@ pub struct FrameFilter {
     /// Radiance that the cells' sums are too coarse for, see [`COARSE`].
     coarse: f32,
     blocks: Blocks,
+    /// Memory of the records of the last block, by tile: asking the system for it again would cost as much as a tenth of
+    /// the filter's work.
+    room: Vec<Vec<PathRecord>>,
 }
 
 enum Sharing {
@@ -134,15 +138,33 @@ impl FrameFilter {
                 Sharing::Adaptive(Box::new(Adaptive::new(&params, anchor, film.tile_count())), blend)
             }
         };
-        Ok(Some(Self { sharing, coarse: unit * COARSE, blocks: Blocks { length: block, epoch: filtering.epoch() } }))
+        let blocks = Blocks { length: block, epoch: filtering.epoch() };
+        Ok(Some(Self { sharing, coarse: unit * COARSE, blocks, room: vec![Vec::new(); film.tile_count()] }))
     }
 
-    /// The vertex that paths are to be cut at.
-    pub fn selection(&self) -> Selection {
-        match self.sharing {
+    /// Room for the records of a block, by tile, to be given back with [`Self::set_room`].
+    pub fn room(&mut self) -> Vec<Vec<PathRecord>> {
+        std::mem::take(&mut self.room)
+    }
+
+    /// Takes records that were added, for their memory.
+    pub fn set_room(&mut self, mut records: Vec<Vec<PathRecord>>) {
+        records.iter_mut().for_each(Vec::clear);
+        self.room = records;
+    }
+
+    /// What keeps the paths of some samples of every pixel, beside the records of those before, by tile.
+    pub fn keepers(&self, records: Vec<Vec<PathRecord>>, samples: &Range<u64>) -> Vec<Paths> {
+        let selection = match self.sharing {
             Sharing::Talk(_, selection) => selection,
             Sharing::Adaptive(..) => Selection::Primary,
-        }
+        };
+        let most = (TILE * TILE) as usize * (samples.end - samples.start) as usize;
+        let keeper = |mut records: Vec<PathRecord>| {
+            records.reserve_exact(most);
+            Paths { records, selection }
+        };
+        records.into_iter().map(keeper).collect()
     }
 
     /// The first of the blocks into which samples `rest` are cut.
@@ -290,6 +312,7 @@ impl FrameFilter {
 
     /// The same at the end: the filter's memory is given back before it is needed for the blend.
     pub fn finish(mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
+        self.room = Vec::new();
         match self.sharing {
             Sharing::Talk(..) => self.develop(surroundings, film),
             Sharing::Adaptive(mut adaptive, blend) => {
@@ -355,23 +378,25 @@ fn blend_into(
     resolved: Vec<Vec<(u32, Resolved)>>,
     blend: &Blend,
     coarse: f32,
-    expose: impl Fn(Vec3) -> Vec3,
+    expose: impl Fn(Vec3) -> Vec3 + Sync,
 ) {
     let resolved = by_slot(film, resolved);
-    let pixel = |at| blend::Pixel::new(film, at, &resolved[film.index(at)], &expose);
     let bounds = film.bounds();
-    let frame = blend::Frame { width: bounds.width() as usize, pixels: bounds.pixels().map(pixel).collect() };
+    let (width, count) = (bounds.width() as usize, bounds.area() as usize);
+    let at = |i: usize| [bounds.min[0] + (i % width) as u32, bounds.min[1] + (i / width) as u32];
+    let pixel = |i| blend::Pixel::new(film, at(i), &resolved[film.index(at(i))], &expose);
+    let frame = blend::Frame { width, pixels: (0..count).into_par_iter().map(pixel).collect() };
     drop(resolved);
     let (mut values, mut shares) = frame.blend(blend);
     drop(frame);
     let coarse = expose(Vec3::splat(coarse)).max_element();
     // At the other end, sums of what fits singly need not fit.
     let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
-    for ((value, share), at) in values.iter_mut().zip(&mut shares).zip(bounds.pixels()) {
-        if !usable(value) {
-            (*value, *share) = (film.pixel(at).mean().as_vec3(), 1.0);
-        }
-    }
+    values.par_iter_mut().zip(&mut shares).enumerate().filter(|(_, (value, _))| !usable(value)).for_each(
+        |(i, (value, share))| {
+            (*value, *share) = (film.pixel(at(i)).mean().as_vec3(), 1.0);
+        },
+    );
     film.set_filtered(&values);
     if film.outputs().aovs.contains(Aov::FilterBlend) {
         let mut by_index = vec![0.0; film.slots()];
@@ -401,11 +426,14 @@ impl Blocks {
 const COARSE: f32 = 1.0 / (1 << 20) as f32;
 
 /// What each pixel of a film got, by its index.
-fn by_slot<T: Clone + Default>(film: &Film, parts: Vec<Vec<(u32, T)>>) -> Vec<T> {
+fn by_slot<T: Clone + Default + Send>(film: &Film, parts: Vec<Vec<(u32, T)>>) -> Vec<T> {
     let mut resolved = vec![T::default(); film.slots()];
-    for (slot, value) in parts.into_iter().flatten() {
-        resolved[slot as usize] = value;
-    }
+    // A tile's pixels are numbered one after the other.
+    let tiles = resolved.par_chunks_mut((TILE * TILE) as usize).zip(parts).enumerate();
+    tiles.for_each(|(tile, (resolved, part))| {
+        let first = tile as u32 * TILE * TILE;
+        part.into_iter().for_each(|(slot, value)| resolved[(slot - first) as usize] = value);
+    });
     resolved
 }
 

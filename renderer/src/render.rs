@@ -14,9 +14,7 @@ use crate::compile::names::Names;
 use crate::compile::{self, CompileError};
 use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
-use crate::filtering::{
-    self, Filtering, FrameFilter, Keep, Keeper, Nothing, Paths, SettingError, Surroundings, Watching,
-};
+use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
 use crate::part;
@@ -511,7 +509,8 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
         statistics: &mut Statistics,
         observer: &dyn Observer,
     ) -> u64 {
-        let (mut next, mut records) = (pass.start, Vec::new());
+        let mut records = frame.filter.as_mut().map(FrameFilter::room).unwrap_or_default();
+        let mut next = pass.start;
         loop {
             let done = frame.samples.count();
             let divisible = frame.filter.as_ref().is_none_or(FrameFilter::divisible);
@@ -531,6 +530,7 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
         if let Some(filter) = &mut frame.filter {
             let start = Instant::now();
             filter.add(&(pass.start..next), &records);
+            filter.set_room(records);
             statistics.filter_seconds += start.elapsed().as_secs_f64();
         }
         next
@@ -538,60 +538,41 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
 
     /// Adds samples of every pixel to the film, and what a filter is to have of them to `records`, by tile.
     fn add(&self, samples: &Range<u64>, frame: &mut Accumulation, records: &mut Vec<Vec<PathRecord>>) -> Counters {
-        let Some(filter) = &frame.filter else { return self.watch(samples, &mut frame.film, || Nothing).0 };
-        let selection = filter.selection();
-        let (counters, paths) = self.watch(samples, &mut frame.film, || Paths::new(selection));
-        records.resize_with(paths.len(), Vec::new);
-        for (records, paths) in records.iter_mut().zip(paths) {
-            if records.is_empty() {
-                *records = paths.records;
-            } else {
-                records.extend(paths.records);
-            }
-        }
+        let Some(filter) = &frame.filter else {
+            let nothing = (0..frame.film.tile_count()).map(|_| Nothing).collect();
+            return self.watch(samples, &mut frame.film, nothing).0;
+        };
+        let keepers = filter.keepers(std::mem::take(records), samples);
+        let (counters, paths) = self.watch(samples, &mut frame.film, keepers);
+        *records = paths.into_iter().map(|paths| paths.records).collect();
         counters
     }
 
-    /// Traces samples `pass` of every pixel, looking aside if the film wants it; what was kept of them, by tile.
-    fn watch<K: Keeper>(
-        &self,
-        pass: &Range<u64>,
-        film: &mut Film,
-        keeper: impl Fn() -> K + Sync,
-    ) -> (Counters, Vec<K>) {
+    /// Traces samples `pass` of every pixel, looking aside if the film wants it, with a keeper for each tile: they are
+    /// returned.
+    fn watch<K: Keeper>(&self, pass: &Range<u64>, film: &mut Film, keepers: Vec<K>) -> (Counters, Vec<K>) {
         if !film.aside() {
-            return self.trace(pass, film, keeper);
+            return self.trace(pass, film, keepers);
         }
         let groups = film.outputs().groups.len();
-        let (counters, kept) = self.trace(pass, film, || Watching { keeper: keeper(), groups, ids: self.ids });
+        let watching = keepers.into_iter().map(|keeper| Watching { keeper, groups, ids: self.ids });
+        let (counters, kept) = self.trace(pass, film, watching.collect());
         (counters, kept.into_iter().map(|watching| watching.keeper).collect())
     }
 
-    /// Traces samples `pass` of every pixel; what was kept of them, by tile.
-    fn trace<K: Keeper>(
-        &self,
-        pass: &Range<u64>,
-        film: &mut Film,
-        keeper: impl Fn() -> K + Sync,
-    ) -> (Counters, Vec<K>) {
+    /// Traces samples `pass` of every pixel.
+    fn trace<K: Keeper>(&self, pass: &Range<u64>, film: &mut Film, mut keepers: Vec<K>) -> (Counters, Vec<K>) {
         let first_hit = film.first_hit();
         let mut tiles = film.tiles();
-        let traced: Vec<(Counters, K)> = tiles
-            .par_iter_mut()
-            .map(|tile| {
-                let mut keeper = keeper();
-                let counters = trace_tile(self.world, self.queries, tile, pass, &self.sampler, first_hit, &mut keeper);
-                self.progress.add(counters.camera_rays);
-                (counters, keeper)
-            })
-            .collect();
-        let mut sum = Counters::default();
-        let kept = traced.into_iter().map(|(counters, keeper)| {
-            sum += counters;
-            keeper
+        let counters = (&mut tiles, &mut keepers).into_par_iter().map(|(tile, keeper)| {
+            let counters = trace_tile(self.world, self.queries, tile, pass, &self.sampler, first_hit, keeper);
+            self.progress.add(counters.camera_rays);
+            counters
         });
-        let kept = kept.collect();
-        (sum, kept)
+        let counters: Vec<Counters> = counters.collect();
+        let mut sum = Counters::default();
+        counters.into_iter().for_each(|counters| sum += counters);
+        (sum, keepers)
     }
 }
 

@@ -6,7 +6,7 @@ use super::{StoredError, Words, load_cells, split};
 use crate::adaptive::Params;
 use crate::grid::CellKey;
 use crate::pairs::Pair;
-use crate::sums::{Sums, WideSums};
+use crate::sums::WideSums;
 
 /// A part's share of one tree of first vertices: its cells, and which slots read them.
 ///
@@ -95,9 +95,9 @@ pub(super) fn store_cells(cells: impl ExactSizeIterator<Item = (CellKey, WideSum
         words.extend(split(key.bits() - last));
         last = key.bits();
         // Whatever fits into 63 bits, as nearly all does, need not be split.
-        match Sums::try_from(&sums) {
-            Ok(Sums { count, weight, rgb: [r, g, b], square }) => words.extend([count << 1, weight, r, g, b, square]),
-            Err(_) => {
+        match sums.words() {
+            Some([count, rest @ ..]) => words.extend([count << 1].into_iter().chain(rest)),
+            None => {
                 let WideSums { count, weight, rgb: [r, g, b], square } = sums;
                 words.extend([count.min(u64::MAX >> 1) << 1 | 1, weight]);
                 words.extend([r, g, b, square].into_iter().flat_map(split));

@@ -111,7 +111,7 @@ impl Adaptive {
     /// # Panics
     /// If there is no such part.
     pub fn store_slots(&self, part: usize, slots: &Range<u32>, words: &mut Vec<u64>) {
-        slots::store(self.parts[part].pairs.own_sums(), slots, words);
+        slots::store(&self.parts[part].pairs.own_sums(), slots, words);
     }
 
     /// Adds what [`Self::store_slots`] appended for this part of another filter over the same frame.

@@ -92,7 +92,7 @@ pub enum Selection {
 pub struct Paths {
     /// Those with a selected vertex.
     pub records: Vec<PathRecord>,
-    selection: Selection,
+    pub(super) selection: Selection,
 }
 
 impl Paths {

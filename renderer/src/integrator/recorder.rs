@@ -107,19 +107,15 @@ struct Selected {
 }
 
 impl Selected {
-    fn new(vertex: &Vertex<'_>, footprint: f32, beta: Rgb) -> Self {
-        let shading = vertex.shading;
+    /// Where light is reflected to counts at the first selected vertex alone: `reflects`.
+    fn new(vertex: &Vertex<'_>, albedo: Rgb, footprint: f32, beta: Rgb, reflects: bool) -> Self {
         let side = if vertex.wo.cos_theta() < 0.0 { -1.0 } else { 1.0 };
+        let bin = if reflects { reflection_bin(side * vertex.shading.frame.n, vertex.surface.wo) } else { 0 };
+        let (p, ng) = (vertex.surface.point.p, side * vertex.surface.ng);
         Self {
-            vertex: filter::Vertex::new(
-                vertex.surface.point.p,
-                side * vertex.surface.ng,
-                footprint,
-                vertex.surface.geometry,
-                reflection_bin(side * shading.frame.n, vertex.surface.wo),
-            ),
+            vertex: filter::Vertex::new(p, ng, footprint, vertex.surface.geometry, bin),
             beta,
-            albedo: shading.bsdf.diffuse_albedo(vertex.wo),
+            albedo,
             received: [Rgb::ZERO; 2],
             weight: (0.0, Rgb::ZERO),
         }
@@ -166,20 +162,26 @@ impl Default for Cut {
 impl Recorder for Cut {
     fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32) {
         let bsdf = &vertex.shading.bsdf;
-        let next = match (&self.first, &self.second) {
-            (None, _) if !bsdf.is_specular() && self.passing > 0 => {
-                self.passing -= 1;
-                return;
+        self.here = false;
+        match (&self.first, &self.second) {
+            (None, _) if !bsdf.is_specular() => {
+                if self.passing > 0 {
+                    self.passing -= 1;
+                    return;
+                }
+                let albedo = bsdf.diffuse_albedo(vertex.wo);
+                self.first = Some(Selected::new(vertex, albedo, footprint, self.beta, true));
+                self.here = true;
             }
-            (None, _) if !bsdf.is_specular() => &mut self.first,
-            (Some(_), None) if bsdf.diffuse_albedo(vertex.wo) != Rgb::ZERO => &mut self.second,
-            _ => {
-                self.here = false;
-                return;
+            (Some(_), None) => {
+                let albedo = bsdf.diffuse_albedo(vertex.wo);
+                self.here = albedo != Rgb::ZERO;
+                if self.here {
+                    self.second = Some(Selected::new(vertex, albedo, footprint, self.beta, false));
+                }
             }
-        };
-        *next = Some(Selected::new(vertex, footprint, self.beta));
-        self.here = true;
+            _ => {}
+        }
     }
 
     fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
