@@ -9,7 +9,7 @@ use crate::pairs::Lobe as PairLobe;
 use crate::record::{PathRecord, Vertex};
 use crate::second::{self, SecondVertices, Suffixes};
 use crate::shards::ShardedTable;
-use crate::shrink::{Shrinkage, estimate};
+use crate::shrink::{Estimates, Shrinkage, estimate};
 use crate::sides::Sides;
 use crate::sums::Quantum;
 use crate::table::Table;
@@ -168,7 +168,7 @@ impl Adaptive {
     }
 
     /// Deposits a block's second vertices, and estimates all cells of the epoch so far, tree by tree.
-    fn share(&mut self, parts: &[Vec<PathRecord>]) -> (Vec<SecondVertices>, Vec<Vec<Vec<[f32; 3]>>>) {
+    fn share(&mut self, parts: &[Vec<PathRecord>]) -> (Vec<SecondVertices>, Vec<Estimates>) {
         let (trees, quantum, side) = (&self.second, &self.quantum, self.params.second_leaf);
         let vertices = parts.par_iter().map_init(second::Batch::default, |batch, records| {
             SecondVertices::new(records, trees, side, quantum, batch)
@@ -214,7 +214,7 @@ impl Adaptive {
     }
 
     /// What each slot gets, given the estimates.
-    fn read(&mut self, estimates: &[Vec<Vec<[f32; 3]>>]) -> Vec<Vec<(u32, Resolved)>> {
+    fn read(&mut self, estimates: &[Estimates]) -> Vec<Vec<(u32, Resolved)>> {
         let (quantum, trees) = (&self.quantum, self.grids.len());
         let resolve = |(at, part): (usize, &mut Part)| {
             part.pairs.resolve(quantum, |lobe: PairLobe, tree: usize, cell: u32| {
@@ -225,7 +225,7 @@ impl Adaptive {
     }
 
     /// The estimate of each cell of each part, tree by tree: one after the other, for each needs room to work.
-    fn estimates(&mut self) -> Vec<Vec<Vec<[f32; 3]>>> {
+    fn estimates(&mut self) -> Vec<Estimates> {
         let mut count = 0;
         let estimates = (0..2 * self.grids.len()).map(|tree| {
             let (estimates, cells) = estimate(&self.tables(tree), &self.quantum, &self.params.shrinkage);

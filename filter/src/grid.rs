@@ -178,7 +178,7 @@ impl Grid {
             let scale = self.inverse_scale * scale;
             let [x, y, z] = [(x - corner_x) * scale, (y - corner_y) * scale, (z - corner_z) * scale];
             // ±2²⁰ cells: further away than any footprint is small. The borders are whole, so this holds for the floor too.
-            let inside = |x: f64| x >= -HALF && x < HALF;
+            let inside = |x: f64| (-HALF..HALF).contains(&x);
             let within = inside(x) & inside(y) & inside(z);
             let found = floor(x) | floor(y) << COORDINATE_BITS | floor(z) << (2 * COORDINATE_BITS);
             *cell = if within { found } else { NO_CELL };

@@ -34,7 +34,7 @@ impl PackedRgb {
         };
         let (mantissa, exponent) = parts(largest);
         // The largest mantissa is in [2¹⁶, 2¹⁷); rounded up to 2¹⁷ it would not fit and the next exponent is taken.
-        let exponent = exponent + 7 + (mantissa + 64 >> 24);
+        let exponent = exponent + 7 + ((mantissa + 64) >> 24);
         let mantissa = |x: f32| {
             let (mantissa, own) = parts(x);
             // Shifted by 25 or more, nothing is left.

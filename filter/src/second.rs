@@ -6,6 +6,7 @@ use crate::adaptive::{Tree, place};
 use crate::grid::{LeafCell, Places};
 use crate::record::{Lobe, PathRecord};
 use crate::shards::ShardedIndex;
+use crate::shrink::Estimates;
 use crate::sums::{Deposit, LUMINANCE, Quantum};
 
 /// The second vertices of a part of a block, which have been deposited in their cells.
@@ -86,12 +87,12 @@ impl Batch {
 pub(crate) struct Suffixes<'a> {
     places: &'a SecondVertices,
     /// Of all cells, tree by tree.
-    estimates: &'a [Vec<Vec<[f32; 3]>>],
+    estimates: &'a [Estimates],
 }
 
 impl<'a> Suffixes<'a> {
     /// From the estimates of all cells, tree by tree.
-    pub fn new(places: &'a SecondVertices, estimates: &'a [Vec<Vec<[f32; 3]>>]) -> Self {
+    pub fn new(places: &'a SecondVertices, estimates: &'a [Estimates]) -> Self {
         Self { places, estimates }
     }
 

@@ -102,6 +102,9 @@ struct Node {
     leaf: bool,
 }
 
+/// Radiance of each cell of each table.
+pub type Estimates = Vec<Vec<[f32; 3]>>;
+
 /// Radiance of each cell of each table, and how many different cells they are.
 ///
 /// The same key may be in several tables, which then share the cell: its sums are those of all.
@@ -109,7 +112,7 @@ pub fn estimate<K: Key, T: Deref<Target = Table<K>> + Sync>(
     tables: &[T],
     quantum: &Quantum,
     shrinkage: &Shrinkage,
-) -> (Vec<Vec<[f32; 3]>>, u64) {
+) -> (Estimates, u64) {
     let keys: Vec<Vec<CellKey>> = tables.par_iter().map(|table| table.keys().collect()).collect();
     let Some(coarsest) = keys.par_iter().flatten_iter().map(|key| key.level()).max() else {
         return (vec![Vec::new(); tables.len()], 0);
