@@ -200,7 +200,8 @@ mod tests {
             "            - \"{{Task.Param.Slice}}/2\"\n",
             "            - \"{{Param.PartsFolder}}/a.####.s{{Task.Param.Slice}}of2.part\"\n",
             "            - \"{{Param.PartsFolder}}/a.####.s1of2.part\"\n",
-            "            - \"openjd\"\n            - \"--spp\"\n            - \"64\"\n",
+            "            - \"openjd\"\n            - \"--path-map\"\n            - \"{{Session.PathMappingRulesFile}}\"\n",
+            "            - \"--spp\"\n            - \"64\"\n",
             "            mode: NOTIFY_THEN_TERMINATE\n            notifyPeriodInSeconds: 90\n",
         ] {
             assert!(text.contains(lines), "{lines}\nis not in\n{text}");
