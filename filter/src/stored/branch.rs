@@ -77,6 +77,9 @@ impl Branch {
         let mut pairs: Vec<Pair> = renumbered.collect();
         pairs.sort_by_key(Pair::order);
         Pair::unite(&mut pairs);
+        // There was room for all that was read, of which most is the same from part to part.
+        cells.shrink_to_fit();
+        pairs.shrink_to_fit();
         Self { cells, pairs }
     }
 
