@@ -11,6 +11,7 @@ use renderer::render::{Job, Prepared, Unobserved, prepare, trace_tile};
 use renderer::sampling::Sampler;
 use tests::render::{own_scene, run};
 use tests::shared;
+use tests::small::{SceneFile, view};
 
 /// Compares every path's pieces with its radiance.
 #[derive(Default)]
@@ -91,6 +92,49 @@ fn pieces_sum_to_the_sample() {
             check(&scene);
         }
     }
+}
+
+/// A floor of albedo 0.5 on which a block of glass stands, without a face of its own below: half of the floor is in glass.
+fn floor_in_glass() -> String {
+    let floor = "Material \"diffuse\" \"rgb reflectance\" [ 0.5 0.5 0.5 ]\n\
+         Shape \"bilinearmesh\" \"point3 P\" [ -9 0 -1  9 0 -1  -9 9 -1  9 9 -1 ]\n";
+    let block = "Material \"dielectric\" \"float eta\" 1.5\n\
+         Shape \"trianglemesh\" \"point3 P\" [ 0 1 -1  9 1 -1  9 8 -1  0 8 -1  0 1 -0.5  9 1 -0.5  9 8 -0.5  0 8 -0.5 ]\n\
+         \"integer indices\" [ 4 5 6 4 6 7  0 1 5 0 5 4  1 2 6 1 6 5  2 3 7 2 7 6  3 0 4 3 4 7 ]\n";
+    let sky = "LightSource \"infinite\" \"rgb L\" [ 1 1 1 ]\n";
+    view([32, 24], "Camera \"perspective\" \"float fov\" 60", &format!("{sky}{floor}{block}"))
+}
+
+#[test]
+fn throughput_and_light_within_glass_are_those_without() {
+    let scene = SceneFile::new(&floor_in_glass());
+    let prepared = prepare(&Job { scene: scene.path(), ..Job::default() }, &Unobserved).expect("a scene");
+    let world = &prepared.world;
+    let queries = Opaque(world.geometry.scene());
+    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default(), false);
+    // Paths and light of the floor outside the block, and of that within.
+    let mut sums = [[0.0_f64; 2]; 2];
+    for tile in &mut film.tiles() {
+        let mut paths = Paths::default();
+        trace_tile(world, &queries, tile, &(0..64), &Sampler::new(1), false, &mut paths);
+        for record in paths.records {
+            // Fresnel's terms decide how often a path is taken and not what it carries, so this is the albedo alone.
+            let throughput = record.diffuse.throughput.get();
+            assert!((throughput - 0.5).abs().max_element() <= 1.0 / f32::from(u16::MAX), "{throughput}");
+            let [x, y] = [0, 1].map(|axis| f64::from(record.first.p[axis]) + world.origin[axis]);
+            let within = x > 0.0 && (1.0..8.0).contains(&y);
+            let [count, light] = &mut sums[usize::from(within)];
+            *count += 1.0;
+            *light += f64::from(record.diffuse.incident(record.suffix.get()).y);
+        }
+    }
+    let [without, within] = sums.map(|[count, light]| light / count);
+    println!("light on the floor: {without:.3} without the glass, {within:.3} within");
+    assert!(sums.iter().all(|[count, _]| *count > 2_000.0));
+    // The sky's 1 fills the cone of refraction within, which is 1/η² = 0.44 of the cosine-weighted hemisphere, less a tenth
+    // for Fresnel's reflections; what comes from beyond it has seen the floor, which absorbs half. Plain radiance would be
+    // 2.25 times as much, and more than there is without.
+    assert!(0.4 < within && within < without && without < 1.0);
 }
 
 #[test]

@@ -73,7 +73,12 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
 /// and what follows. [`Cut::after`] lets such vertices pass before it cuts.
 ///
 /// Each piece counts its light from its own beginning, with throughput 1 there, so that nothing is ever divided by a
-/// throughput. [`Cut::record`] puts the pieces together.
+/// throughput. [`Cut::record`] puts the pieces together. Light is *basic* radiance, over the square of the index of where it
+/// is: an interface does not change it but for what it reflects, so that what stands half in glass is lit alike within and
+/// without. With plain radiance, vertices within would share 1/η² of the throughput and η² of the light with those outside,
+/// and their mean would bring either side what is the other's.
+///
+/// **Source** of basic radiance: \[Nicodemus63\].
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
     /// Light that is met before the first selected vertex, and all of a path without one.
@@ -84,8 +89,10 @@ pub struct Cut {
     between: Rgb,
     /// Light that is met beyond the second, from there on.
     beyond: Rgb,
-    /// Throughput from the last selected vertex, or from the camera.
+    /// Throughput of basic radiance from the last selected vertex, or from the camera.
     beta: Rgb,
+    /// Radiance where the path is over basic radiance: the square of the index there over that at the camera.
+    squeezed: f32,
     /// Where the path is, is a selected vertex.
     here: bool,
     /// Vertices at which the path could be cut and is not.
@@ -121,17 +128,19 @@ impl Selected {
         }
     }
 
-    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
+    fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight, squeezed: f32) {
         let diffuse = vertex.shading.bsdf.diffuse(vertex.wo, light.wi);
-        self.received[0] += diffuse * light.incident;
-        self.received[1] += (light.f - self.albedo * diffuse).max(Rgb::ZERO) * light.incident;
+        let incident = light.incident / squeezed;
+        self.received[0] += diffuse * incident;
+        self.received[1] += (light.f - self.albedo * diffuse).max(Rgb::ZERO) * incident;
     }
 
-    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+    /// `weight`: of basic radiance.
+    fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample, weight: Rgb) {
         // A delta lobe is none of the diffuse one's directions.
         let diffuse = if next.specular { 0.0 } else { vertex.shading.bsdf.diffuse(vertex.wo, next.wi) / next.pdf };
         // The difference of nearly equal numbers where there is no other lobe: rounding may have it negative.
-        self.weight = (diffuse, (next.weight - self.albedo * diffuse).max(Rgb::ZERO));
+        self.weight = (diffuse, (weight - self.albedo * diffuse).max(Rgb::ZERO));
     }
 
     fn survive(&mut self, worth: f32) {
@@ -153,6 +162,7 @@ impl Default for Cut {
             between: Rgb::ZERO,
             beyond: Rgb::ZERO,
             beta: Rgb::ONE,
+            squeezed: 1.0,
             here: false,
             passing: 0,
         }
@@ -186,19 +196,22 @@ impl Recorder for Cut {
 
     fn receive(&mut self, vertex: &Vertex<'_>, light: &DirectLight) {
         match (self.here, &mut self.first, &mut self.second) {
-            (true, _, Some(second)) => second.receive(vertex, light),
-            (true, Some(first), None) => first.receive(vertex, light),
+            (true, _, Some(second)) => second.receive(vertex, light, self.squeezed),
+            (true, Some(first), None) => first.receive(vertex, light, self.squeezed),
             _ => self.meets(light.f * light.incident, light.group),
         }
     }
 
     fn scatter(&mut self, vertex: &Vertex<'_>, next: &BsdfSample) {
+        let squeeze = if next.transmission { next.eta * next.eta } else { 1.0 };
+        let weight = next.weight * squeeze;
+        self.squeezed *= squeeze;
         match (self.here, &mut self.first, &mut self.second) {
             (true, _, Some(last)) | (true, Some(last), None) => {
-                last.scatter(vertex, next);
+                last.scatter(vertex, next, weight);
                 self.beta = Rgb::ONE;
             }
-            _ => self.beta *= next.weight,
+            _ => self.beta *= weight,
         }
     }
 
@@ -215,7 +228,7 @@ impl Recorder for Cut {
             (Some(_), None) => &mut self.between,
             (Some(_), Some(_)) => &mut self.beyond,
         };
-        *piece += self.beta * radiance;
+        *piece += self.beta * (radiance / self.squeezed);
     }
 }
 
