@@ -201,3 +201,23 @@ fn sides_are_those_of_the_finest_cells() {
     let largest = 0.03 * filter.params.leaf;
     assert!(sides.iter().flatten().all(|(_, side)| (0.25 * largest..=largest).contains(side)), "{sides:?}");
 }
+
+#[test]
+fn leaves_shrink_as_samples_grow() {
+    let leaves = |samples| {
+        let params = Params::for_samples(samples);
+        [params.leaf, params.second_leaf]
+    };
+    assert_eq!(Params::for_samples(16), Params::default());
+    let cases = [
+        (0, [4.0, 16.0]),
+        (1, [4.0, 16.0]),
+        (8, [4.0, 4.0]),
+        (256, [2.0, 1.0]),
+        (4096, [1.0; 2]),
+        (u64::MAX, [1.0; 2]),
+    ];
+    for (samples, expected) in cases {
+        assert_eq!(leaves(samples), expected, "{samples}");
+    }
+}

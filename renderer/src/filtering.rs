@@ -34,14 +34,19 @@ pub enum Filtering {
 }
 
 impl Filtering {
-    /// With what depends on the frame's samples per pixel decided: an epoch of 0 becomes an eighth of them, a power of two
-    /// and at least [`SHORTEST_EPOCH`].
+    /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`], see [`filter::Params::for_samples`],
+    /// and an epoch of 0, which becomes an eighth of them, a power of two and at least [`SHORTEST_EPOCH`].
     ///
     /// Ranges of whole epochs are filtered alike on one machine and on several, so the epoch is the trade between how much
     /// second vertices share and how many slices a frame can be cut into. Measured against one epoch over all samples, an
     /// eighth loses about a tenth of the gain at 16 samples and a fifth at 256.
     pub fn settled(mut self, spp: u64) -> Self {
         if let Self::Adaptive(params, _) = &mut self {
+            let measured = filter::Params::for_samples(spp);
+            for (leaf, measured) in [(&mut params.leaf, measured.leaf), (&mut params.second_leaf, measured.second_leaf)]
+            {
+                *leaf = if *leaf == AUTO { measured } else { *leaf };
+            }
             if params.epoch == 0 {
                 params.epoch = 1 << (spp / 8).max(SHORTEST_EPOCH).ilog2();
             }
@@ -66,6 +71,9 @@ impl Filtering {
         }
     }
 }
+
+/// Width of leaves that [`Filtering::settled`] decides.
+const AUTO: f32 = 0.0;
 
 /// Shortest epoch that is chosen without being asked for, samples per pixel.
 const SHORTEST_EPOCH: u64 = 4;
@@ -457,6 +465,19 @@ mod tests {
             assert_eq!(epoch(spp, 0), expected, "{spp}");
         }
         assert_eq!(epoch(256, 12), 12);
+    }
+
+    #[test]
+    fn leaves_are_measured_unless_told() {
+        let leaves = |filtering: Filtering| match filtering.settled(256) {
+            Filtering::Adaptive(params, _) => [params.leaf, params.second_leaf],
+            _ => unreachable!("the adaptive filter"),
+        };
+        let mut filtering = Filtering::named("adaptive").unwrap();
+        assert_eq!(leaves(filtering), [2.0, 1.0]);
+        filtering.set("leaf", "7").unwrap();
+        assert_eq!(leaves(filtering), [7.0, 1.0]);
+        assert_eq!(leaves(filtering.settled(256)), [7.0, 1.0]);
     }
 
     #[test]

@@ -2,15 +2,18 @@
 
 use std::path::PathBuf;
 
-use renderer::filtering::{Blend, Filtering};
+use renderer::filtering::Filtering;
 use renderer::render::{Frame, Job};
 
 use crate::image::RgbImage;
 use crate::render::run;
 
 /// The adaptive filter as it is by default.
+///
+/// # Panics
+/// Never.
 pub fn adaptive() -> Filtering {
-    Filtering::Adaptive(filter::Params::default(), Blend::default())
+    Filtering::named("adaptive").expect("the adaptive filter")
 }
 
 /// A scene file that lasts as long as this.

@@ -2,7 +2,7 @@
 
 use filter::talk::{self, Eviction, Jitter, LevelOfDetail, Reading};
 
-use super::{Blend, Filtering, Selection};
+use super::{AUTO, Blend, Filtering, Selection};
 
 /// A setting that a filter does not have or does not take. The message says what it would take.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -72,6 +72,22 @@ macro_rules! positive {
     };
 }
 
+/// A number above 0, or one that is decided by the frame's samples.
+macro_rules! measured {
+    ($key:literal, $($field:ident).+: $kind:ty) => {
+        Setting {
+            key: $key,
+            values: "auto or above 0",
+            get: |all| if all.$($field).+ == AUTO { "auto".into() } else { all.$($field).+.to_string() },
+            set: |all, text| {
+                let number = text.parse().ok().filter(|value: &$kind| *value > 0.0 && value.is_finite());
+                let value = if text == "auto" { Some(AUTO) } else { number };
+                value.map(|value| all.$($field).+ = value).is_some()
+            },
+        }
+    };
+}
+
 /// Yes or no.
 macro_rules! switch {
     ($key:literal, $($field:ident).+) => {
@@ -106,8 +122,8 @@ struct TalkSettings {
 const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("trees", params.trees: u32, 1, 8),
     number!("second_trees", params.second_trees: u32, 1, 8),
-    positive!("leaf", params.leaf: f32),
-    positive!("second_leaf", params.second_leaf: f32),
+    measured!("leaf", params.leaf: f32),
+    measured!("second_leaf", params.second_leaf: f32),
     Setting {
         key: "epoch",
         values: "auto or 1 to 1000000000",
@@ -307,7 +323,10 @@ impl Filtering {
         match name {
             "none" => Some(Self::None),
             "talk" => Some(Self::Talk(talk, Selection::default())),
-            "adaptive" => Some(Self::Adaptive(filter::Params::default(), Blend::default())),
+            "adaptive" => {
+                let params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
+                Some(Self::Adaptive(params, Blend::default()))
+            }
             _ => None,
         }
     }
@@ -423,6 +442,7 @@ mod tests {
             ("adaptive", "tau", "3.25", "-0.1"),
             ("adaptive", "levels", "0", "1.5"),
             ("adaptive", "leaf", "0.5", "0"),
+            ("adaptive", "second_leaf", "auto", "-1"),
             ("adaptive", "epoch", "auto", "0"),
             ("adaptive", "epoch", "12", "always"),
             ("talk", "vertex", "tertiary", "quaternary"),
@@ -450,7 +470,7 @@ mod tests {
     fn messages_name_what_there_is() {
         let mut filtering = Filtering::named("adaptive").unwrap();
         let error = filtering.set("probes", "3").unwrap_err().to_string();
-        for word in ["\"adaptive\"", "\"probes\"", "trees (1 to 8)", "leaf (above 0)"] {
+        for word in ["\"adaptive\"", "\"probes\"", "trees (1 to 8)", "leaf (auto or above 0)"] {
             assert!(error.contains(word), "no {word} in {error}");
         }
         assert!(Filtering::None.set("trees", "1").unwrap_err().to_string().contains("it has none"));

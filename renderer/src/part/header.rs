@@ -93,6 +93,7 @@ impl Header {
             // What has no meaning with the other settings is refused, and is not needed.
             let _ = filtering.set(key, value);
         }
+        let filtering = filtering.settled(self.spp);
         let valid =
             filtering.validate().is_ok() && storable(&filtering).is_ok() && self.unit > 0.0 && self.unit.is_finite();
         (within(0) && within(1) && small && known && valid).then(|| FrameDescription {
