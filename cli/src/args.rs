@@ -195,7 +195,7 @@ pub struct QualityArguments {
     /// Stop rendering after this long and write what there is: 90, 90s, 10m, 1.5h
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub time_limit: Option<Duration>,
-    /// Stop when the frame's estimated relMSE is at most this; --spp is the most that is taken
+    /// Stop when the estimated relMSE of the frame's best 99.9 % of pixels is at most this; --spp is the most that is taken
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub target_error: Option<f64>,
     /// Stop when the mean standard error of the pixels is at most this share of the mean; --spp is the most that is taken
@@ -381,7 +381,8 @@ pub enum ReportFormat {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "\
 Figures, of image I against reference R, over all pixels and the three channels:
-  relMSE        mean of (I - R)² / (R² + 0.01 m²), m being the channel's mean in R
+  relMSE        mean of (I - R)² / (R² + 0.01 m²), m being the channel's mean in R; at the end of the line without the \
+                worst thousandth of the pixels, which is what renders estimate of themselves
   RMSE          root of the mean of (I - R)²
   mean ratio    mean of I over mean of R, a channel each
   blocks        median over 32 x 32 pixel blocks of the difference between the blocks' means, relative to R's

@@ -173,7 +173,7 @@ fn light_kind(kind: &LightKind) -> &'static str {
     }
 }
 
-/// What goes beyond pinhole, opaque meshes, and lights of constant emission.
+/// What goes beyond a pinhole, opaque meshes of plain materials, and one light of constant emission.
 fn features(scene: &Scene) -> Vec<&'static str> {
     let textured = |alpha: &Option<Value<f32>>| alpha.as_ref().is_some_and(|value| *value != Value::Constant(1.0));
     let any_shape = |wanted: fn(&ShapeKind) -> bool| shapes(scene).any(|shape| wanted(&shape.kind));
@@ -181,6 +181,7 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         matches!(kind, ShapeKind::Sphere { .. } | ShapeKind::Disk { .. } | ShapeKind::Cylinder { .. })
     };
     let portals = |kind: &LightKind| matches!(kind, LightKind::Infinite { portal, .. } if !portal.is_empty());
+    let procedural = |kind: &TextureKind| !matches!(kind, TextureKind::Constant(_) | TextureKind::Image(_));
     let window = scene.film.crop_window.is_some() || scene.film.pixel_bounds.is_some();
     [
         ("instances", !scene.instances.is_empty()),
@@ -189,9 +190,12 @@ fn features(scene: &Scene) -> Vec<&'static str> {
         ("bilinear patches", any_shape(|kind| matches!(kind, ShapeKind::Bilinear(_)))),
         ("subdivision surfaces", any_shape(|kind| matches!(kind, ShapeKind::Loop { .. }))),
         ("alpha masks", shapes(scene).any(|shape| textured(&shape.alpha))),
+        ("coats", scene.materials.iter().any(|material| material_kind(&material.kind).starts_with("coated"))),
         ("bump maps", scene.materials.iter().any(|material| material.displacement.is_some())),
         ("normal maps", scene.materials.iter().any(|material| material.normal_map.is_some())),
         ("image textures", scene.textures.iter().any(|texture| matches!(texture.kind, TextureKind::Image(_)))),
+        ("procedural textures", scene.textures.iter().any(|texture| procedural(&texture.kind))),
+        ("several lights", scene.lights.len() + shapes(scene).filter(|shape| shape.area_light.is_some()).count() > 1),
         ("image environment", scene.lights.iter().any(|light| light_kind(&light.kind) == "infinite (image)")),
         ("portals", scene.lights.iter().any(|light| portals(&light.kind))),
         ("textured area lights", scene.area_lights.iter().any(|light| light.image.is_some())),

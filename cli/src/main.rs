@@ -20,6 +20,7 @@ mod metric;
 mod oidn;
 mod output;
 mod picture;
+mod prices;
 mod progress;
 mod sanitise;
 mod significance;

@@ -12,6 +12,8 @@ use crate::ssim;
 const BLOCK: usize = 32;
 /// Keeps the relative error of dark pixels finite: this share of the squared mean of the reference.
 const RELATIVE_FLOOR: f64 = 0.01;
+/// The share of the pixels without those that a few bright samples decide.
+const BEST: f64 = 0.999;
 
 /// All figures. Pixels that are not finite in either image are counted and left out of the rest.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,6 +25,8 @@ pub struct Comparison {
     pub relmse: f64,
     /// The same for each channel.
     pub relmse_channels: [f64; 3],
+    /// The same over the best 99.9 % of the pixels: what renders estimate of themselves.
+    pub relmse_best: f64,
     /// √ of the mean over pixels and channels of (I − R)².
     pub rmse: f64,
     /// Mean of I over mean of R for each channel; `None` where R is black and I is not.
@@ -74,15 +78,18 @@ pub fn compare(image: &Picture, errors: Option<Errors<'_>>, reference: &Referenc
     let mean_r = channel_means(&pairs, |_, r, _| r);
     let mean_i = channel_means(&pairs, |i, _, _| i);
     let scale = |r: f64, c: usize| r * r + RELATIVE_FLOOR * mean_r[c] * mean_r[c];
-    let relmse_channels = [0, 1, 2].map(|c| {
-        let error = |(pair, half): (&Pair, &[f32; 3])| {
-            let (difference, half) = (pair.map(|(i, r)| i[c] - r[c])?, f64::from(half[c]));
+    let relative = |(pair, half): (&Pair, &[f32; 3])| {
+        let (i, r) = pair.as_ref()?;
+        Some([0, 1, 2].map(|c| {
+            let (difference, half) = (i[c] - r[c], f64::from(half[c]));
             let square = (difference - half) * (difference + half);
             // Only a channel that is black all over has no floor, and then either no error or an infinite one.
-            Some(if square == 0.0 { 0.0 } else { square / scale(pair.as_ref()?.1[c], c) })
-        };
-        pairs.iter().zip(&halves).filter_map(error).sum::<f64>() / pairs.iter().flatten().count().max(1) as f64
-    });
+            if square == 0.0 { 0.0 } else { square / scale(r[c], c) }
+        }))
+    };
+    let relative: Vec<[f64; 3]> = pairs.iter().zip(&halves).filter_map(relative).collect();
+    let relmse_channels =
+        [0, 1, 2].map(|c| relative.iter().map(|pixel| pixel[c]).sum::<f64>() / relative.len().max(1) as f64);
     let squares = channel_means(&pairs, |i, r, _| (i - r).powi(2));
     let differences = pairs.iter().flatten().flat_map(|(i, r)| (0..3).map(|c| (i[c] - r[c]).abs()));
     let flip = flip::hdr_flip(&pairs, image.width);
@@ -92,6 +99,7 @@ pub fn compare(image: &Picture, errors: Option<Errors<'_>>, reference: &Referenc
         resolution: [image.width, image.height],
         relmse: relmse_channels.iter().sum::<f64>() / 3.0,
         relmse_channels,
+        relmse_best: best(&relative),
         rmse: (squares.iter().sum::<f64>() / 3.0).sqrt(),
         mean_ratio: [0, 1, 2].map(|c| ratio(mean_i[c], mean_r[c])),
         block_difference: median(block_differences(&pairs, image.width)),
@@ -104,6 +112,14 @@ pub fn compare(image: &Picture, errors: Option<Errors<'_>>, reference: &Referenc
         predicted: significance::predict(&pairs, noise, |r, c| scale(r[c], c)),
         non_finite: [image, reference.picture].map(|p| p.pixels.iter().filter(|pixel| !finite(pixel)).count() as u64),
     }
+}
+
+/// Mean over channels and the best 99.9 % of the pixels.
+fn best(relative: &[[f64; 3]]) -> f64 {
+    let mut sorted: Vec<f64> = relative.iter().map(|pixel| pixel.iter().sum::<f64>() / 3.0).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let kept = (sorted.len() as f64 * BEST).round() as usize;
+    sorted[..kept].iter().sum::<f64>() / kept.max(1) as f64
 }
 
 /// Mean over pixels of a function of I, R and the channel's index.

@@ -51,7 +51,7 @@ pub struct Stats<'a> {
 /// The frame's own estimate of its error.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Error {
-    /// Expected relMSE.
+    /// Expected relMSE of the best 99.9 % of the pixels.
     pub relmse: f64,
     /// Its 95 % interval.
     pub interval: [f64; 2],

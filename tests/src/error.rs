@@ -15,15 +15,20 @@ impl Errors {
     /// Of `image` against references `a` and `b`, all of one size.
     pub fn new(image: &[[f32; 3]], a: &RgbImage, b: &RgbImage) -> Self {
         let mean: [f64; 3] = std::array::from_fn(|c| 0.5 * (a.mean()[c] + b.mean()[c]));
-        let pixel = |(i, (a, b)): (&[f32; 3], (&[f32; 3], &[f32; 3]))| {
-            let channel = |c: usize| {
-                let (i, a, b) = (f64::from(i[c]), f64::from(a[c]), f64::from(b[c]));
-                let r = 0.5 * (a + b);
-                (i - a) * (i - b) / (r * r + 0.01 * mean[c] * mean[c])
-            };
-            (channel(0) + channel(1) + channel(2)) / 3.0
+        Self::weighted(image, a, b, |i, c| {
+            let r = 0.5 * (f64::from(a.pixels[i][c]) + f64::from(b.pixels[i][c]));
+            (r * r + 0.01 * mean[c] * mean[c]).recip()
+        })
+    }
+
+    /// The same with what multiplies the product of the differences in channel `c` of pixel `i` given.
+    pub fn weighted(image: &[[f32; 3]], a: &RgbImage, b: &RgbImage, weight: impl Fn(usize, usize) -> f64) -> Self {
+        let channel = |i: usize, c: usize| {
+            let [value, a, b] = [image[i][c], a.pixels[i][c], b.pixels[i][c]].map(f64::from);
+            (value - a) * (value - b) * weight(i, c)
         };
-        Self { pixels: image.iter().zip(a.pixels.iter().zip(&b.pixels)).map(pixel).collect(), width: a.width }
+        let pixels = (0..image.len()).map(|i| (channel(i, 0) + channel(i, 1) + channel(i, 2)) / 3.0);
+        Self { pixels: pixels.collect(), width: a.width }
     }
 
     /// relMSE over the best `share` of the pixels.

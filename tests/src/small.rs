@@ -30,6 +30,15 @@ impl SceneFile {
         Self { folder }
     }
 
+    /// Puts a file beside the scene's.
+    ///
+    /// # Panics
+    /// If there is no room for it.
+    pub fn with(self, name: &str, bytes: &[u8]) -> Self {
+        std::fs::write(self.folder.path().join(name), bytes).expect("a file in the temporary folder");
+        self
+    }
+
     /// Where the file is.
     pub fn path(&self) -> PathBuf {
         self.folder.path().join("scene.pbrt")

@@ -70,13 +70,14 @@ fn text(result: &Comparison) -> String {
     let [red, green, blue] = &result.relmse_channels;
     let [first, last] = result.flip_exposures;
     let mut text = format!(
-        "pixels       {} x {}\nrelMSE       {:.6}   R {red:.6}  G {green:.6}  B {blue:.6}\nRMSE         {:.6}\n\
-         mean ratio   R {}  G {}  B {}\nblocks       {:.3} %\nSSIM         {:.5}\nPSNR         {:.2} dB\n\
+        "pixels       {} x {}\nrelMSE       {:.6}   R {red:.6}  G {green:.6}  B {blue:.6}   best 99.9 %: {:.6}\n\
+         RMSE         {:.6}\nmean ratio   R {}  G {}  B {}\nblocks       {:.3} %\nSSIM         {:.5}\nPSNR         {:.2} dB\n\
          HDR-FLIP     {:.5}   exposures {first:+.2} to {last:+.2}\nmax |I - R|  {:.6}\n\
          not finite   {} in the image, {} in the reference\n",
         result.resolution[0],
         result.resolution[1],
         result.relmse,
+        result.relmse_best,
         result.rmse,
         ratio(&result.mean_ratio[0]),
         ratio(&result.mean_ratio[1]),

@@ -17,6 +17,7 @@ use crate::exit::Failure;
 use crate::inventory::{Counts, Inventory, LENS};
 use crate::job;
 use crate::log::Log;
+use crate::prices::{self, Price};
 use crate::sanitise;
 use crate::stats;
 
@@ -26,6 +27,8 @@ struct Report<'a> {
     scene: &'a Path,
     #[serde(flatten)]
     inventory: Inventory,
+    /// What its features cost where `ci/bench-features` measured them.
+    prices: Vec<Price>,
     /// What building the scene found out; absent if it was not built.
     #[serde(flatten)]
     built: Option<Built>,
@@ -125,7 +128,8 @@ pub fn run(arguments: &InfoArguments, log: &Log) -> Result<(), Failure> {
         (Some(built), warnings)
     };
     let warnings = warnings.iter().map(ToString::to_string).collect();
-    let report = Report { scene: &arguments.scene, inventory, built, warnings };
+    let prices = prices::of(&inventory.features);
+    let report = Report { scene: &arguments.scene, inventory, prices, built, warnings };
     print(&match arguments.format {
         ReportFormat::Text => text(&report),
         ReportFormat::Json => {
@@ -194,6 +198,9 @@ fn text(report: &Report<'_>) -> String {
         row("media", &inventory.media.join(", "));
     }
     row("needs", &if inventory.features.is_empty() { "nothing special".into() } else { inventory.features.join(", ") });
+    if !report.prices.is_empty() {
+        row("costs", &format!("{} (of tracing a small room, ci/bench-features)", prices::in_words(&report.prices)));
+    }
     row("assets", &many(inventory.assets.len() as u64, "file"));
     if let Some(built) = &report.built {
         row("primitives", &format!("{} in memory, {} with instances", built.unique_primitives, built.primitives));

@@ -84,6 +84,9 @@ fn develop(
     }
     let (mut frame, watch) = pool.install(|| add_up(parts)).map_err(failure)?;
     let error = watch.and_then(|watch| watch.finish(&mut frame.film));
+    if let Some(error) = &error {
+        log.info(&stats::Error::of(error).summary());
+    }
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }

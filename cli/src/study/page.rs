@@ -185,15 +185,19 @@ impl Study<'_> {
 
     /// What renders thought of their errors.
     fn foretold(&self) -> String {
-        let known: Vec<(&Point, f64)> =
-            self.points.iter().filter_map(|p| Some((p, p.predicted.filter(|x| *x > 0.0 && p.relmse > 0.0)?))).collect();
+        let known: Vec<(&Point, f64)> = self
+            .points
+            .iter()
+            .filter_map(|p| Some((p, p.predicted.filter(|x| *x > 0.0 && p.relmse_best > 0.0)?)))
+            .collect();
         if known.is_empty() {
             return String::new();
         }
         let frame = Frame { size: [560.0, 400.0], margins: [58.0, 84.0, 28.0, 48.0] };
-        let values = || known.iter().flat_map(|(p, predicted)| [p.relmse, *predicted]);
+        let values = || known.iter().flat_map(|(p, predicted)| [p.relmse_best, *predicted]);
         let axis = |title: &str| Axis::over(title, values(), tick);
-        let mut chart = Chart::new(frame, axis("relMSE against the reference"), axis("relMSE as estimated"));
+        let mut chart =
+            Chart::new(frame, axis("relMSE of the best 99.9 % against the reference"), axis("relMSE as estimated"));
         let [low, high] = axis("").range;
         // The diagonal, and what is within a factor of 1.25 of it, cut off by the axes.
         let near = |x: f64| (x, [(x / 1.25).max(low), (x * 1.25).min(high)]);
@@ -203,12 +207,12 @@ impl Study<'_> {
         for index in 0..self.plan.settings.len() {
             let class = format!("s{}", index % COLOURS);
             let points: Vec<&(&Point, f64)> = known.iter().filter(|(p, _)| p.setting == index).collect();
-            chart.line(&format!("{class} thin"), &points.iter().map(|(p, y)| [p.relmse, *y]).collect::<Vec<_>>());
+            chart.line(&format!("{class} thin"), &points.iter().map(|(p, y)| [p.relmse_best, *y]).collect::<Vec<_>>());
             for (p, predicted) in &points {
-                let (estimate, error) = (number(*predicted), number(p.relmse));
+                let (estimate, error) = (number(*predicted), number(p.relmse_best));
                 let words = format!("{}, {} samples: estimated {estimate}, is {error}", escaped(&p.name), p.spp);
-                chart.dot(&class, [p.relmse, *predicted], false, &words);
-                off.push((predicted / p.relmse).ln().abs());
+                chart.dot(&class, [p.relmse_best, *predicted], false, &words);
+                off.push((predicted / p.relmse_best).ln().abs());
             }
         }
         off.sort_by(f64::total_cmp);
@@ -216,7 +220,8 @@ impl Study<'_> {
         format!(
             "<h2>What the renderer knew</h2>\n<div class=\"pair\">\n<div class=\"card\"><h3>Estimated against measured</h3>\n{}\
              </div>\n<div><p>Every render estimates its own error, without a reference: that is what \
-             <code>--target-error</code> goes by. Dots on the diagonal were right; the band is a factor of 1.25.</p>\n\
+             <code>--target-error</code> goes by. It is the relMSE of the best 99.9 % of the pixels. Dots on the diagonal \
+             were right; the band is a factor of 1.25.</p>\n\
              <p>Half of these estimates, each a mean over seeds, are within <b>{median:.0} %</b> of the error that was then \
              measured. Renders of too few samples to tell are not shown.</p>\n<ul class=\"legend\">{}</ul></div>\n</div>\n",
             chart.finish("Estimated against measured error"),

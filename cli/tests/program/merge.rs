@@ -45,6 +45,62 @@ fn a_split_gives_the_bytes_of_one_machine() {
     }
 }
 
+/// The frame's estimate is the same in the log, in the statistics and in the image; that of parts is of the frame with all of
+/// them against the frame with some.
+#[test]
+fn a_filtered_frame_of_parts_knows_its_error() {
+    let bench = bench();
+    let job = ["render", "scene.pbrt", "--spp", "64", "--aov", "error", "--filter", "adaptive", "--progress", "none"];
+    let render = |options: &[&str]| bench.succeed(&[&job[..], options].concat());
+    let run = render(&["-o", "whole.exr", "--stats", "whole.json"]);
+    let stats: serde_json::Value = serde_json::from_slice(&bytes(&bench, "whole.json")).unwrap();
+    let figure = |path: &str| stats.pointer(path).and_then(serde_json::Value::as_f64).unwrap();
+    let whole = ["/error/relmse", "/error/interval/0", "/error/interval/1"].map(figure);
+    let estimate = |name: &str, log: &str| {
+        let image = read(&bench.path(name));
+        let text = |key: &str| match image.attribute(key) {
+            Some(oiio::Attribute::Text(text)) => text.clone(),
+            other => panic!("{name}: {key} is {other:?}"),
+        };
+        let numbers = |text: String| text.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
+        let (relmse, interval) = (numbers(text("tessera/relMSE"))[0], numbers(text("tessera/relMSE95")));
+        assert!(interval[0] > 0.0 && interval[0] < relmse && relmse < interval[1], "{name}: {relmse} {interval:?}");
+        assert!(log.contains(&format!("estimated relMSE {relmse:.2e}")), "{name}: {log}");
+        // Standard errors are those of pixels: their squares over the image's make up the estimate, to a factor of two, for
+        // weights differ.
+        let channel = |name: &str| image.channel(name).unwrap();
+        let pixels = || image.pixels.chunks_exact(image.channels.len());
+        let (values, errors) = (["R", "G", "B"].map(channel), ["error.R", "error.G", "error.B"].map(channel));
+        let mean = values.map(|c| pixels().map(|p| f64::from(p[c])).sum::<f64>() / pixels().len() as f64);
+        let term = |p: &[f32], c: usize| {
+            f64::from(p[errors[c]]).powi(2) / (f64::from(p[values[c]]).powi(2) + 0.01 * mean[c] * mean[c])
+        };
+        let sum: f64 = pixels().map(|p| (0..3).map(|c| term(p, c)).sum::<f64>()).sum();
+        let ratio = sum / (3 * pixels().len()) as f64 / relmse;
+        assert!((0.5..2.0).contains(&ratio), "{name}: {ratio}");
+        [relmse, interval[0], interval[1]]
+    };
+    assert_eq!(estimate("whole.exr", &run.stderr), whole);
+    for (slices, first) in [(2, "0"), (4, "0"), (4, "3")] {
+        let mut names: Vec<String> = (0..slices).map(|slice| format!("{slice}.part")).collect();
+        for (slice, name) in names.iter().enumerate() {
+            render(&["-o", name, "--slice", &format!("{slice}/{slices}")]);
+        }
+        names.sort_by_key(|name| !name.starts_with(first));
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let run = bench.succeed(&[&["merge", "-o", "merged.exr"], &names[..]].concat());
+        let merged = estimate("merged.exr", &run.stderr);
+        // Half of the samples were held out, if not the same half: the intervals of both overlap.
+        assert!(merged[1] < whole[2] && whole[1] < merged[2], "{slices} slices: {merged:?}, at once {whole:?}");
+        let beauty = |name: &str| {
+            let image = read(&bench.path(name));
+            let of = |p: &[f32]| ["R", "G", "B"].map(|name| p[image.channel(name).unwrap()].to_bits());
+            image.pixels.chunks_exact(image.channels.len()).map(of).collect::<Vec<_>>()
+        };
+        assert!(beauty("merged.exr") == beauty("whole.exr"), "{slices} slices differ from the frame");
+    }
+}
+
 #[test]
 fn parts_that_do_not_make_a_frame_are_refused_by_name() {
     let bench = bench();

@@ -6,6 +6,7 @@ pub mod ray;
 pub mod rgb;
 pub mod transform;
 pub mod warp;
+mod wiener;
 pub mod window;
 
 pub use frame::{Frame, LocalDir};
@@ -13,4 +14,5 @@ pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;
+pub use wiener::wiener;
 pub use window::{widened, windows};

@@ -2,11 +2,16 @@
 //!
 //! `bench_error SCENE.pbrt WIDTHxHEIGHT SPP[,SPP...] REFERENCE-A.exr REFERENCE-B.exr [TARGET[,TARGET...]]`
 //!
-//! For each, the predicted relMSE over the measured one, the slope of the logarithms of predicted over measured RMSE of blocks of
-//! 32×32 pixels, and the share of values within 1.96 standard errors of the reference, whose own noise is added: pooled over
-//! 7×7 pixels, for with one degree of freedom it would cover but 70 %. References of half floats are known to 2⁻¹¹ of their
-//! values, and errors below that are not seen. With targets, the measured relMSE over the target of frames that were stopped
-//! by it.
+//! For each, the predicted relMSE over the measured one, both of the best 99.9 % of the pixels; the slope of the logarithms of
+//! predicted over measured RMSE of blocks of 32×32 pixels, of all pixels and of those; and the share of values within 1.96
+//! standard errors of the reference, whose own noise is added: pooled over 7×7 pixels, for with one degree of freedom it
+//! would cover but 70 %. References of half floats are known to 2⁻¹¹ of their values, and errors below that are not seen.
+//! With targets, the measured relMSE over the target of frames that were stopped by it.
+//!
+//! Errors are relative to the references' mean after a Wiener filter. Where little light is found references of thousands of
+//! samples are noisy too: dark pixels that are darker yet by chance would count for several times as much.
+//!
+//! `TESSERA_SEED` is the seed of the frames, 1 if it is not set.
 //!
 //! Never a test: it only prints.
 #![forbid(unsafe_code)]
@@ -19,7 +24,7 @@ use renderer::error::{Estimate, Goal, Watch};
 use renderer::film::Film;
 use renderer::filtering::Filtering;
 use renderer::frame::Accumulation;
-use renderer::math::windows;
+use renderer::math::{wiener, windows};
 use renderer::render::{self, Frame, Job, Observer};
 use serde_json::json;
 use tests::error::Errors;
@@ -29,6 +34,38 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Relative rounding of half floats, 2⁻¹¹.
 const HALF_FLOAT: f64 = 1.0 / 2048.0;
+
+/// The share of the pixels that relMSE is of, the best ones.
+const BEST: f64 = 0.999;
+
+/// What frames are measured against.
+struct References {
+    halves: [RgbImage; 2],
+    /// What squared errors are multiplied by.
+    weights: Vec<DVec3>,
+    /// Squared errors of the references' mean, relative.
+    noise: Vec<DVec3>,
+}
+
+impl References {
+    fn new(a: RgbImage, b: RgbImage) -> Self {
+        let value = |image: &RgbImage, i: usize| glam::Vec3::from_array(image.pixels[i]).as_dvec3();
+        let count = a.pixels.len();
+        let mean: Vec<DVec3> = (0..count).map(|i| 0.5 * (value(&a, i) + value(&b, i))).collect();
+        let noise: Vec<DVec3> = (0..count).map(|i| 0.5 * (value(&a, i) - value(&b, i))).collect();
+        let level = mean.iter().sum::<DVec3>() / count as f64;
+        let smooth = wiener(&mean, &noise, a.width);
+        let weights: Vec<DVec3> = smooth.into_iter().map(|r| (r * r + 0.01 * level * level).recip()).collect();
+        let noise = noise.iter().zip(&weights).map(|(noise, weight)| *noise * *noise * *weight).collect();
+        let noise = windows(noise, a.width, 3, |sum: DVec3, count| sum / count as f64);
+        Self { halves: [a, b], weights, noise }
+    }
+
+    fn errors(&self, image: &[[f32; 3]]) -> Errors {
+        let [a, b] = &self.halves;
+        Errors::weighted(image, a, b, |i, c| self.weights[i][c])
+    }
+}
 
 struct Watched(Watch);
 
@@ -56,11 +93,11 @@ fn main() -> Result<(), Failure> {
     let name = Path::new(scene).parent().and_then(Path::file_name).ok_or("the scene is in no folder")?;
     let job = Job {
         scene: PathBuf::from(scene),
-        seed: Some(1),
+        seed: Some(std::env::var("TESSERA_SEED").map_or(Ok(1), |seed| seed.parse())?),
         resolution: Some([width.parse()?, height.parse()?]),
         ..Job::default()
     };
-    let references = [read_exr(Path::new(a)), read_exr(Path::new(b))];
+    let references = References::new(read_exr(Path::new(a)), read_exr(Path::new(b)));
     for filtering in ["none", "adaptive"].map(|name| Filtering::named(name).expect("a known filter")) {
         for spp in spps.split(',').filter(|spp| !spp.is_empty()) {
             let spp = spp.parse()?;
@@ -75,7 +112,7 @@ fn main() -> Result<(), Failure> {
             let relmse: f64 = target.parse()?;
             let goal = Goal { relmse: Some(relmse), noise: None };
             let (frame, _) = run(&Job { spp: Some(4096), filtering, ..job.clone() }, goal)?;
-            let measured = Errors::new(&pixels(&frame), &references[0], &references[1]).relmse(1.0);
+            let measured = references.errors(&pixels(&frame)).relmse(BEST);
             let samples = frame.samples.count();
             let landed = measured / relmse;
             let (scene, filter) = (name.to_string_lossy(), filtering.name());
@@ -95,48 +132,49 @@ fn run(job: &Job, goal: Goal) -> Result<(Frame, Option<Estimate>), Failure> {
     Ok((frame, estimate))
 }
 
-fn figures(frame: &Frame, estimate: Option<Estimate>, [a, b]: &[RgbImage; 2]) -> serde_json::Value {
+fn figures(frame: &Frame, estimate: Option<Estimate>, references: &References) -> serde_json::Value {
     let image = pixels(frame);
-    let errors = Errors::new(&image, a, b);
+    let errors = references.errors(&image);
     let known: Vec<[f32; 3]> = frame.film.bounds().pixels().map(|at| frame.film.error(at).to_array()).collect();
-    let mean: [f64; 3] = std::array::from_fn(|c| 0.5 * (a.mean()[c] + b.mean()[c]));
-    let weight = |i: usize, c: usize| {
-        let r = 0.5 * (f64::from(a.pixels[i][c]) + f64::from(b.pixels[i][c]));
-        (r * r + 0.01 * mean[c] * mean[c]).recip()
-    };
-    let of_reference = |i: usize| {
-        let noise = |c: usize| 0.5 * f64::from(a.pixels[i][c] - b.pixels[i][c]);
-        DVec3::new(noise(0), noise(1), noise(2)).powf(2.0) * DVec3::new(weight(i, 0), weight(i, 1), weight(i, 2))
-    };
-    let of_reference =
-        windows((0..image.len()).map(of_reference).collect(), a.width, 3, |sum: DVec3, count| sum / count as f64);
+    let [a, b] = &references.halves;
     let (mut within, mut predicted) = (0usize, errors.clone());
     for (i, error) in known.iter().enumerate() {
         predicted.pixels[i] = 0.0;
         for c in 0..3 {
+            let weight = references.weights[i][c];
             let [a, b, e] = [a.pixels[i][c], b.pixels[i][c], error[c]].map(f64::from);
-            let (r, noise) = (0.5 * (a + b), (of_reference[i][c] / weight(i, c)).sqrt());
+            let (r, noise) = (0.5 * (a + b), (references.noise[i][c] / weight).sqrt());
             within += usize::from((f64::from(image[i][c]) - r).abs() <= 1.96 * e.hypot(noise) + HALF_FLOAT * r.abs());
-            predicted.pixels[i] += e * e * weight(i, c) / 3.0;
+            predicted.pixels[i] += e * e * weight / 3.0;
         }
     }
-    let pairs: Vec<(f64, f64)> = (errors.blocks(32).into_iter().zip(predicted.blocks(32)))
-        .filter(|(measured, predicted)| *measured > HALF_FLOAT * HALF_FLOAT && *predicted > 0.0)
-        .map(|(measured, predicted)| (0.5 * measured.ln(), 0.5 * predicted.ln()))
-        .collect();
-    let interval = estimate.map(|estimate| estimate.interval);
+    let slope_of_all = slope(&errors, &predicted);
+    let measured = errors.relmse(BEST);
+    let (mut best, mut predicted_best) = (errors.clone(), predicted);
+    let mut sorted = errors.pixels.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let most = sorted[((sorted.len() as f64 * BEST).round() as usize).clamp(1, sorted.len()) - 1];
+    for i in (0..image.len()).filter(|i| errors.pixels[*i] > most) {
+        (best.pixels[i], predicted_best.pixels[i]) = (0.0, 0.0);
+    }
     json!({
-        "measured": errors.relmse(1.0),
+        "measured": measured,
+        "measured_all": errors.relmse(1.0),
         "predicted": estimate.map(|estimate| estimate.relmse),
-        "interval": interval,
-        "ratio": estimate.map(|estimate| estimate.relmse / errors.relmse(1.0)),
-        "slope": slope(&pairs),
+        "interval": estimate.map(|estimate| estimate.interval),
+        "ratio": estimate.map(|estimate| estimate.relmse / measured),
+        "slope": slope_of_all,
+        "slope_best": slope(&best, &predicted_best),
         "coverage": within as f64 / (3 * image.len()) as f64,
     })
 }
 
-/// Of the second over the first by the reduced major axis, as both have noise.
-fn slope(pairs: &[(f64, f64)]) -> f64 {
+/// Of the logarithms of predicted over measured RMSE of blocks, by the reduced major axis, as both have noise.
+fn slope(measured: &Errors, predicted: &Errors) -> f64 {
+    let pairs: Vec<(f64, f64)> = (measured.blocks(32).into_iter().zip(predicted.blocks(32)))
+        .filter(|(measured, predicted)| *measured > HALF_FLOAT * HALF_FLOAT && *predicted > 0.0)
+        .map(|(measured, predicted)| (0.5 * measured.ln(), 0.5 * predicted.ln()))
+        .collect();
     let n = pairs.len() as f64;
     let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));

@@ -28,13 +28,15 @@ struct Feature {
 const WORLD: &str = "WorldBegin\n";
 const BLOCK: &str = PLAIN;
 const CAMERA: &str = "\"float fov\" 40";
+const FILM: &str = "Film \"rgb\"";
+const INTEGRATOR: &str = "Integrator \"path\"";
 
 const CHECKS: &str = "Texture \"t\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [ 0.6 0.6 0.7 ] \"rgb tex2\" [ 0.6 0.6 0.71 ]\n\
                       Material \"diffuse\" \"rgb reflectance\" [ 0.6 0.6 0.7 ]\n";
 const CHECKED: &str = "Texture \"t\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [ 0.6 0.6 0.7 ] \"rgb tex2\" [ 0.6 0.6 0.71 ]\n\
                        Material \"diffuse\" \"texture reflectance\" \"t\"\n";
 
-const FEATURES: [Feature; 10] = [
+const FEATURES: [Feature; 17] = [
     Feature {
         name: "instances",
         unused: "ObjectBegin \"o\"\nShape \"trianglemesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 ]\nObjectEnd\n",
@@ -60,7 +62,22 @@ const FEATURES: [Feature; 10] = [
         used: "Shape \"curve\" \"point3 P\" [ 0 0 1 0 0 1.1 0 0.1 1.1 0.1 0.1 1.1 ] \"float width\" 0.02\n",
         at: WORLD,
     },
-    Feature { name: "textures", unused: CHECKS, used: CHECKED, at: BLOCK },
+    Feature { name: "procedural textures", unused: CHECKS, used: CHECKED, at: BLOCK },
+    Feature {
+        name: "image textures",
+        unused: "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"image.ppm\"\n\
+                 Material \"diffuse\" \"rgb reflectance\" [ 0.6 0.6 0.7 ]\n",
+        used: "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"image.ppm\"\n\
+               Material \"diffuse\" \"texture reflectance\" \"t\"\n",
+        at: BLOCK,
+    },
+    Feature {
+        name: "normal maps",
+        unused: "Material \"diffuse\" \"string normalmap\" \"image.ppm\"\n\
+                 Material \"diffuse\" \"rgb reflectance\" [ 0.6 0.6 0.7 ]\n",
+        used: "Material \"diffuse\" \"rgb reflectance\" [ 0.6 0.6 0.7 ] \"string normalmap\" \"image.ppm\"\n",
+        at: BLOCK,
+    },
     Feature {
         name: "bump maps",
         unused: "Texture \"d\" \"float\" \"wrinkled\"\nMaterial \"diffuse\" \"texture displacement\" \"d\"\n\
@@ -76,10 +93,30 @@ const FEATURES: [Feature; 10] = [
         at: BLOCK,
     },
     Feature {
-        name: "a second light",
+        name: "several lights",
         unused: "LightSource \"infinite\" \"rgb L\" [ 0 0 0 ]\n",
         used: "LightSource \"infinite\" \"rgb L\" [ 0.1 0.1 0.1 ]\n",
         at: WORLD,
+    },
+    Feature {
+        name: "image environment",
+        unused: "LightSource \"infinite\" \"rgb L\" [ 0 0 0 ]\n",
+        used: "LightSource \"infinite\" \"string filename\" \"image.ppm\" \"float scale\" 0.1\n",
+        at: WORLD,
+    },
+    Feature {
+        name: "bilinear patches",
+        unused: "ObjectBegin \"o\"\nShape \"bilinearmesh\" \"point3 P\" [ 0 0 0 1 0 0 0 1 0 1 1 0 ]\nObjectEnd\n",
+        used: "Shape \"bilinearmesh\" \"point3 P\" [ 0 0 1 0.1 0 1 0 0.1 1 0.1 0.1 1.1 ]\n",
+        at: WORLD,
+    },
+    Feature { name: "auxiliary channels", unused: FILM, used: "Film \"gbuffer\"", at: FILM },
+    Feature { name: "clamping", unused: FILM, used: "Film \"rgb\" \"float maxcomponentvalue\" 10", at: FILM },
+    Feature {
+        name: "regularisation",
+        unused: "Integrator \"path\" \"bool regularize\" false",
+        used: "Integrator \"path\" \"bool regularize\" true",
+        at: INTEGRATOR,
     },
     Feature {
         name: "depth of field",
@@ -88,7 +125,7 @@ const FEATURES: [Feature; 10] = [
         at: CAMERA,
     },
     Feature {
-        name: "media",
+        name: "participating media",
         unused: "MakeNamedMedium \"m\" \"string type\" \"homogeneous\"\n",
         used: "MakeNamedMedium \"m\" \"string type\" \"homogeneous\"\nMediumInterface \"m\" \"\"\nMaterial \"interface\"\n\
                Shape \"trianglemesh\" \"point3 P\" [ 0 0 1 0.1 0 1 0 0.1 1 ]\n",
@@ -111,10 +148,12 @@ fn main() -> Result<(), Failure> {
         WORLD => base.replacen(WORLD, &format!("{WORLD}AttributeBegin\n{change}AttributeEnd\n"), 1),
         at => base.replacen(at, change, 1),
     };
-    let mut scenes = vec![SceneFile::new(&base)];
+    let image = image();
+    let scene = |text: &str| SceneFile::new(text).with("image.ppm", &image);
+    let mut scenes = vec![scene(&base)];
     for feature in &FEATURES {
         assert!(base.contains(feature.at), "the room has no {}", feature.at);
-        scenes.extend([feature.unused, feature.used].map(|change| SceneFile::new(&variant(feature, change))));
+        scenes.extend([feature.unused, feature.used].map(|change| scene(&variant(feature, change))));
     }
     let mut ratios = vec![Vec::new(); scenes.len()];
     for _ in 0..rounds.max(1) {
@@ -138,6 +177,13 @@ fn main() -> Result<(), Failure> {
         println!("{line}");
     }
     Ok(())
+}
+
+/// A square image of 64 × 64 pixels, blue enough to be normals.
+fn image() -> Vec<u8> {
+    let mut bytes = b"P6\n64 64\n255\n".to_vec();
+    bytes.extend((0..64u8).flat_map(|y| (0..64u8).flat_map(move |x| [120 + x / 4, 120 + y / 4, 250])));
+    bytes
 }
 
 /// Processor time of tracing, of the one thread that does it.

@@ -61,6 +61,13 @@ fn touching_glass_is_invisible_in_white() {
 }
 
 #[test]
+fn a_glass_cube_seen_at_a_corner_is_invisible_in_white() {
+    // Faces, edges and the corner; rays that are reflected within meet a face at the angle of the first and leave there.
+    let cube = glass(1.5, 0.0) + "Rotate 35.26439 1 0 0\nRotate 45 0 1 0\n" + &super::support::closed_box(0.6);
+    invisible("a cube", &cube);
+}
+
+#[test]
 fn slabs_a_millionth_apart_are_invisible_in_white() {
     let slab = |z0: f64, z1: f64, eta: f64| {
         let (half, middle, stretch) = (super::support::closed_box(1.0), 0.5 * (z0 + z1), 0.5 * (z1 - z0));

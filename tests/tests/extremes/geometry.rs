@@ -7,7 +7,8 @@ use tests::small::{bits, values};
 use tests::synthetic::thorough;
 
 use super::support::{
-    ROUNDING, both, check_all, check_mean, diffuse, frame, job, lamp, picture, pinhole, quad, scene, sky, warned,
+    ROUNDING, both, check_all, check_mean, closed_box, diffuse, frame, job, lamp, picture, pinhole, quad, scene, sky,
+    warned,
 };
 
 /// A floor of strips, each `length` long and `length / aspect` wide, seen so that each pixel has many.
@@ -137,6 +138,20 @@ fn open_boxes_that_touch_are_one_furnace() {
         2.0,
         ROUNDING,
     );
+}
+
+#[test]
+fn no_ray_slips_through_the_edges_and_corners_of_a_cube() {
+    // From within, towards a corner, an edge of the cube, and one between the two triangles of a face.
+    let world =
+        "AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] \"bool twosided\" true\n".to_owned() + &closed_box(1.0);
+    for (name, [x, y, z]) in [("corner", [1.0, 1.0, 1.0]), ("edge", [1.0, 1.0, 0.3]), ("diagonal", [1.0, 0.25, 0.25])] {
+        for fov in [1e-3, 1e-1, 10.0] {
+            let camera = format!("LookAt 0.1 -0.2 0.3  {x} {y} {z}  0 1 0\n{}", pinhole(fov));
+            let image = picture(&scene([64, 64], 1, &camera, &world), 16, Filtering::None);
+            check_all(&format!("{name}, {fov} degrees"), &image, 1.0, 0.0);
+        }
+    }
 }
 
 /// Shadow rays of a plane that is lit at `elevation`: no point of it is in the shadow of another, so all pixels show
