@@ -58,9 +58,11 @@ impl Then {
 /// How well the change is known to tell the error, as degrees of freedom go: to a factor of two in 95 % of all frames. The
 /// frames of eleven scenes from 16 to 256 samples did so, 0.27 to 0.34 being the deviation of the logarithm.
 const CERTAINTY: f64 = 8.0;
-/// What is not known of the error that has been measured, in parts of what the change tells: 0.1 for a rate of decline that
-/// is off by 0.15, and as much for each of weights and of what the worst pixels are.
+/// What is not known of an error that has been measured, in parts of what the change tells: the worst pixels are other ones.
 const DOUBT: f64 = 0.2;
+/// The deviation of the logarithm that comes to all others: 0.1 for a rate of decline that is off by 0.15, and as much for
+/// weights.
+const REST: f64 = 0.15;
 
 /// Judges a frame F of n samples by what it was with m of them, Fₘ.
 ///
@@ -100,7 +102,7 @@ pub(super) fn judge(film: &Film, pixels: &[Pixel], earlier: &Earlier, width: usi
     let local: Vec<DVec3> = all().map(|at| change(at) * change(at) * weights[at]).collect();
     let changed = mean(&local).0;
     let level = if changed > 0.0 { relmse / changed } else { 1.0 };
-    let factor = (NORMAL_95 * deviation).exp();
+    let factor = (NORMAL_95 * deviation.hypot(REST)).exp();
     Judgement { relmse, interval: [relmse / factor, relmse * factor], local, weights, level }
 }
 
