@@ -106,6 +106,10 @@ impl Watch {
         state.next = 2 * samples;
         if self.goal != Goal::default() {
             let (_, estimate) = estimate(film, state.best(samples));
+            // Three samples are the least of which a filtered frame knows its error.
+            if samples == 2 && estimate.is_none() {
+                state.next = 3;
+            }
             if let Some(estimate) = estimate {
                 state.reached |= self.goal.reached(&estimate);
                 // At least a tenth more, so that looking stays cheap.
@@ -115,10 +119,8 @@ impl Watch {
         }
         let last = state.earlier[1].as_ref().map_or(0, |earlier| earlier.samples);
         if film.filtered() && samples >= 2 * last {
-            if let Some(earlier) = Earlier::new(film, samples) {
-                state.earlier.swap(0, 1);
-                state.earlier[1] = Some(earlier);
-            }
+            state.earlier.swap(0, 1);
+            state.earlier[1] = Some(Earlier::new(film, samples));
         }
         state.reached
     }
@@ -129,7 +131,7 @@ impl Watch {
     }
 
     /// Gives the finished film its errors; `None` with too few samples to tell: without even and odd ones, or filtered and
-    /// not looked at when it had even and odd ones and half of all at most.
+    /// not looked at when it had half of all at most.
     pub fn finish(&self, film: &mut Film) -> Option<Estimate> {
         let state = self.state();
         let samples = film.bounds().pixels().next().map_or(0, |at| film.pixel(at).count());
@@ -146,7 +148,7 @@ impl Watch {
 impl State {
     /// The frame with the most samples of which as many have been taken since.
     fn best(&self, samples: u64) -> Option<&Earlier> {
-        self.earlier.iter().flatten().rfind(|earlier| 2 * earlier.samples <= samples)
+        self.earlier.iter().flatten().rfind(|earlier| earlier.serves(samples))
     }
 }
 
@@ -228,7 +230,6 @@ mod tests {
             let (film, found) = filtered(bias);
             // By definition; what one film is off by chance is small, for it has 65536 / 25 independent means.
             let expected = (1.0 / 16.0 / 25.0 + f64::from(bias).powi(2)) / (100.0 * 1.01);
-            println!("bias {bias}: {:.2} of what it is", found.relmse / expected);
             assert!((0.7..1.4).contains(&(found.relmse / expected)), "{bias}: {found:?}, {expected}");
             assert!(found.interval[0] < expected && expected < found.interval[1], "{bias}: {found:?}, {expected}");
             let within = |at: &[u32; 2]| (film.value(*at).x - 10.0).abs() <= 1.96 * f64::from(film.error(*at).x);
@@ -243,7 +244,7 @@ mod tests {
         let mut film = film(16, 10.0);
         film.set_filtered(&vec![Rgb::ONE; 64 * 64]);
         assert_eq!(watch.finish(&mut film), None);
-        // With more than half of the samples is too late, and one sample has no halves.
+        // With more than half of the samples is too late.
         watch.look(&film, 9);
         assert_eq!(watch.finish(&mut film), None);
     }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::estimator::{Judgement, NORMAL_95, Pixel, best, floor, mean_and_error, weight};
-use crate::film::Film;
+use crate::film::{self, Film};
 use crate::math::{Rgb, windows};
 
 /// A frame as it was.
@@ -17,41 +17,34 @@ pub(super) struct Earlier {
 #[derive(Clone, Copy)]
 struct Then {
     value: Rgb,
-    /// Means of even and of odd samples, and what their sums were divided by.
-    halves: [Rgb; 2],
-    normalisations: [f32; 2],
+    /// Σ w L and Σ w of even and of odd samples.
+    halves: [(Rgb, f32); 2],
 }
 
 impl Earlier {
-    /// `None` with too few samples for two halves.
-    pub fn new(film: &Film, samples: u64) -> Option<Self> {
+    pub fn new(film: &Film, samples: u64) -> Self {
         let then = |at| {
-            let pixel = film.pixel(at);
-            Some(Then {
-                value: film.value(at).as_vec3(),
-                halves: pixel.halves()?.map(|half| half.as_vec3()),
-                normalisations: pixel.half_normalisations().map(|weight| weight as f32),
-            })
+            let halves = film.pixel(at).half_sums().map(|(sum, weight)| (sum.as_vec3(), weight as f32));
+            Then { value: film.value(at).as_vec3(), halves }
         };
-        Some(Self { samples, pixels: film.bounds().pixels().map(then).collect::<Option<_>>()? })
+        Self { samples, pixels: film.bounds().pixels().map(then).collect() }
+    }
+
+    /// Whether a frame of so many samples has as many since as it had then, and both even and odd ones.
+    pub fn serves(&self, samples: u64) -> bool {
+        samples >= 2 * self.samples && samples >= self.samples + 2
     }
 }
 
 impl Then {
     /// Means of even and of odd samples since; those of all where weights of both signs leave nothing to divide by.
-    fn since(&self, film: &Film, at: [u32; 2]) -> Option<[DVec3; 2]> {
-        let pixel = film.pixel(at);
-        let (now, weights) = (pixel.halves()?, pixel.half_normalisations());
-        let half = |half: usize| {
-            let before = f64::from(self.normalisations[half]);
-            let weight = weights[half] - before;
-            if weight > 0.0 {
-                (now[half] * weights[half] - self.halves[half].as_dvec3() * before) / weight
-            } else {
-                now[half]
-            }
+    fn since(&self, now: &film::Pixel) -> [DVec3; 2] {
+        let half = |((sum, weight), (earlier, before)): ((DVec3, f64), (Rgb, f32))| {
+            let (since, of) = (sum - earlier.as_dvec3(), weight - f64::from(before));
+            if of > 0.0 { since / of } else { sum / weight.max(f64::MIN_POSITIVE) }
         };
-        Some([half(0), half(1)])
+        let [even, odd] = now.half_sums();
+        [half((even, self.halves[0])), half((odd, self.halves[1]))]
     }
 }
 
@@ -87,7 +80,7 @@ pub(super) fn judge(film: &Film, pixels: &[Pixel], earlier: &Earlier, width: usi
     let decline = Decline::new(mean(&changes).0, mean(&noise).0, growth);
     drop((changes, noise));
     let unseen = film.bounds().pixels().zip(then).zip(&whole).map(|((at, then), weight)| {
-        let [even, odd] = then.since(film, at).unwrap_or([then.value.as_dvec3(); 2]);
+        let [even, odd] = then.since(film.pixel(at));
         let value = then.value.as_dvec3();
         (value - even) * (value - odd) * *weight
     });

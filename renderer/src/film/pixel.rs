@@ -130,6 +130,11 @@ impl Pixel {
         (self.count > 1).then(|| [mean(0), mean(1)])
     }
 
+    /// Σ w L, film RGB, and Σ w of even and of odd samples.
+    pub fn half_sums(&self) -> [(DVec3, f64); 2] {
+        [0, 1].map(|half| (DVec3::from_array(self.halves[half].value()), weight(self.weights[half])))
+    }
+
     /// What sums of even and of odd samples are divided by.
     pub fn half_normalisations(&self) -> [f64; 2] {
         self.weights.map(|quanta| normalisation(weight(quanta), 0.5 * f64::from(self.count.max(1))))
