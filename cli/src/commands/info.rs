@@ -199,7 +199,13 @@ fn text(report: &Report<'_>) -> String {
     }
     row("needs", &if inventory.features.is_empty() { "nothing special".into() } else { inventory.features.join(", ") });
     if !report.prices.is_empty() {
-        row("costs", &format!("{} (of tracing a small room, ci/bench-features)", prices::in_words(&report.prices)));
+        row(
+            "costs",
+            &format!(
+                "{} (of tracing a small room, ci/bench-features)",
+                prices::in_words(&report.prices, prices::noise())
+            ),
+        );
     }
     row("assets", &many(inventory.assets.len() as u64, "file"));
     if let Some(built) = &report.built {
