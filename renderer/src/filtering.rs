@@ -469,7 +469,7 @@ mod tests {
 
     #[test]
     fn leaves_are_measured_unless_told() {
-        let leaves = |filtering: Filtering| match filtering.settled(256) {
+        let leaves = |filtering: Filtering| match filtering.settled(4096) {
             Filtering::Adaptive(params, _) => [params.leaf, params.second_leaf],
             _ => unreachable!("the adaptive filter"),
         };
@@ -477,7 +477,7 @@ mod tests {
         assert_eq!(leaves(filtering), [2.0, 1.0]);
         filtering.set("leaf", "7").unwrap();
         assert_eq!(leaves(filtering), [7.0, 1.0]);
-        assert_eq!(leaves(filtering.settled(256)), [7.0, 1.0]);
+        assert_eq!(leaves(filtering.settled(4096)), [7.0, 1.0]);
     }
 
     #[test]

@@ -15,9 +15,9 @@
 //! b = (m + √(m² + 4s²)) / 2,  m = e − s²/B,
 //!
 //! or the lower confidence bound e − c s if that is more: at first nothing is believed, so only what is certain speaks
-//! against the filter. Where s is small b is e, where it is large b is B. The result is F + w (U − F), w = b / (b + V), which
-//! minimises the error of the sum of independent estimates. As samples grow V and s vanish, and w goes to 1 wherever F is
-//! wrong.
+//! against the filter. Where s is small b is e, where it is large b is B. The result is F + w (U − F), w = κb / (κb + V).
+//! With κ = 1 and the true b that minimises the squared error of the sum of independent estimates; [`BIAS`] says why κ is
+//! more. As samples grow V and s vanish, and w goes to 1 wherever F is wrong.
 //!
 //! With one sample a pixel there are no halves; then the neighbouring pixel stands for the other half.
 //!
@@ -206,6 +206,12 @@ impl Evidence {
     }
 }
 
+/// κ, what the filter's error counts over noise. The mean of the density above is twice its peak, which is what b is; and a
+/// bias is what more samples around do not average out. Measured on six scenes at 4 to 64 samples: from 1 to 3 the squared
+/// errors change by −6 to +5 %, −0.3 % in the mean, from 3 to 5 by −3 to +3 %; and the bias at 1024 falls by a fifth and
+/// more, to half of the error.
+const BIAS: f64 = 4.0;
+
 /// Nested windows of 3, 9, 27 and 81 pixels a side.
 const LEVELS: usize = 4;
 
@@ -231,7 +237,8 @@ fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sy
             believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
         }
         // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
-        if believed > 0.0 { (believed / (believed + levels[1][i].noise())) as f32 } else { 0.0 }
+        let bias = BIAS * believed;
+        if bias > 0.0 { (bias / (bias + levels[1][i].noise())) as f32 } else { 0.0 }
     };
     (0..frame.pixels.len()).into_par_iter().map(weight).collect()
 }
