@@ -13,4 +13,4 @@ pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;
-pub use window::{widened, windows};
+pub use window::{Widening, widened, windows};

@@ -164,7 +164,8 @@ fn write_image(
     }
     let mut frame = pool.install(|| traced.develop());
     let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
-    let attributes = metadata::of_frame(&frame, error.as_ref(), provenance);
+    let provenance = provenance.then_some(&frame.statistics);
+    let attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
     let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     Ok(Written { frame, losses, error })
