@@ -140,7 +140,7 @@ fn stored_sums_of_several_filters_resolve_tree_by_tree_to_the_bits_of_the_whole(
         let parts = if count == 1 { std::slice::from_ref(&expected_words) } else { &parts[..] };
         let mut merging = Merging::new(&filter().params, 5, 16, true);
         let mut words = vec![vec![Vec::new(); TREES + 1]; 5];
-        for tree in 0..TREES {
+        (0..TREES).for_each(|tree| {
             let branches = (0..5).map(|part| {
                 let shares = parts.iter().map(|words| read(part, tree, &words[part][tree]).unwrap());
                 let sum = Branch::sum(shares.collect());
@@ -152,7 +152,7 @@ fn stored_sums_of_several_filters_resolve_tree_by_tree_to_the_bits_of_the_whole(
             merging.add(branches);
             merging.add(rest);
             merging.end_tree();
-        }
+        });
         for part in 0..5 {
             let mut sum = Slots::default();
             parts.iter().for_each(|words| sum.add(Slots::read(&slots(part), &words[part][TREES]).unwrap()));

@@ -115,7 +115,7 @@ impl<'w> Aside<'w> {
 impl Recorder for Aside<'_> {
     fn arrive(&mut self, vertex: &Vertex<'_>, _: f32) {
         if self.bounces == 0 {
-            self.seen = self.ids.map(|ids| ids.of(&vertex.surface));
+            self.seen = self.ids.map(|ids| ids.of(vertex.surface));
         }
         if self.feature.is_none() && !vertex.shading.bsdf.is_specular() {
             let albedo = vertex.shading.bsdf.albedo(vertex.wo) * self.beta * self.squeezed;
