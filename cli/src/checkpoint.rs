@@ -46,13 +46,17 @@ struct Publishing {
 }
 
 impl<'a> Checkpoints<'a> {
-    /// Those that the command line asks for; makes sure that they can be written.
+    /// Those that the command line asks for, in a file that was prepared.
     ///
     /// # Errors
-    /// They cannot.
-    pub fn new(arguments: &CheckpointArguments, path: Option<PathBuf>, log: &'a Log) -> Result<Self, Failure> {
-        let file = path.as_deref().map(OutputFile::prepare).transpose()?;
+    /// The file is something else, which is not written over.
+    pub fn new(arguments: &CheckpointArguments, file: Option<OutputFile>, log: &'a Log) -> Result<Self, Failure> {
         let path = file.map(|file| file.target().to_owned());
+        if let Some(path) = path.as_deref().filter(|path| std::fs::metadata(path).is_ok_and(|file| file.len() > 0)) {
+            if let Err(why @ PartError::Foreign(_)) = Part::open(path) {
+                return Err(Failure::Input(format!("{why}; give --checkpoint a file of its own")));
+            }
+        }
         let state = Mutex::new(State { last: Instant::now(), passes: 0, publishing: None });
         Ok(Self { path, interval: arguments.checkpoint_interval, resume: arguments.resume, log, state })
     }

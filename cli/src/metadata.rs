@@ -7,14 +7,19 @@ use renderer::error::Estimate;
 use renderer::film::{Aov, cryptomatte};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Samples};
-use renderer::render::Frame;
+use renderer::render::Statistics;
 
 use crate::{job, stats};
 
-/// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless provenance is
-/// asked for. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
-pub fn of_frame(frame: &Frame, error: Option<&Estimate>, provenance: bool) -> Vec<(String, Attribute)> {
-    let mut attributes = of_samples(&frame.description, &frame.samples);
+/// The image's metadata. It depends on the job alone, so that the same job gives the same bytes, unless there is
+/// provenance: what it took. OpenEXR multiplies row vectors from the left, so the columns of our matrices are the rows of its.
+pub fn of_frame(
+    description: &FrameDescription,
+    samples: &Samples,
+    error: Option<&Estimate>,
+    provenance: Option<&Statistics>,
+) -> Vec<(String, Attribute)> {
+    let mut attributes = of_samples(description, samples);
     if let Some(error) = error {
         let text = |x: String| Attribute::Text(x);
         let [low, high] = error.interval;
@@ -22,8 +27,8 @@ pub fn of_frame(frame: &Frame, error: Option<&Estimate>, provenance: bool) -> Ve
         attributes.push(("tessera/relMSE95".into(), text(format!("{low} {high}"))));
         attributes.push(("tessera/relativeNoise".into(), text(error.noise.to_string())));
     }
-    if provenance {
-        add_provenance(&mut attributes, frame);
+    if let Some(statistics) = provenance {
+        add_provenance(&mut attributes, statistics);
     }
     attributes
 }
@@ -93,15 +98,15 @@ pub fn span(samples: &Samples) -> [u64; 2] {
     first.zip(last).map_or([0, 0], |(first, last)| [first.start, last.end])
 }
 
-fn add_provenance(attributes: &mut Vec<(String, Attribute)>, frame: &Frame) {
+fn add_provenance(attributes: &mut Vec<(String, Attribute)>, statistics: &Statistics) {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     attributes.retain(|(name, _)| name != "DateTime");
     attributes.push(("DateTime".into(), Attribute::Text(job::exif_date(now))));
     if let Ok(host) = std::fs::read_to_string("/proc/sys/kernel/hostname") {
         attributes.push(("HostComputer".into(), Attribute::Text(host.trim().into())));
     }
-    attributes.push(("renderTimeSeconds".into(), Attribute::Float(frame.statistics.render_seconds as f32)));
-    attributes.push(("tessera/threads".into(), Attribute::Int(frame.statistics.threads as i32)));
+    attributes.push(("renderTimeSeconds".into(), Attribute::Float(statistics.render_seconds as f32)));
+    attributes.push(("tessera/threads".into(), Attribute::Int(statistics.threads as i32)));
     if let Some(bytes) = stats::peak_memory() {
         attributes.push(("tessera/peakRSS".into(), Attribute::Text(bytes.to_string())));
     }

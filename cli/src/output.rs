@@ -42,6 +42,15 @@ impl OutputFile {
         &self.target
     }
 
+    /// Whether another path leads to the same place.
+    pub fn is(&self, other: &Self) -> bool {
+        let place = |target: &Path| {
+            let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            (fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned()), target.file_name().map(ToOwned::to_owned))
+        };
+        place(&self.target) == place(&other.target)
+    }
+
     /// The file in the making.
     ///
     /// # Errors

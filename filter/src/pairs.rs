@@ -286,78 +286,95 @@ impl Pairs {
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
     pub fn resolve(&mut self, quantum: &Quantum, read: impl Fn(Lobe, usize, u32) -> [f32; 3]) -> Vec<(u32, Resolved)> {
         self.compact();
-        let mut gathered = Gathered::default();
-        gathered.add(&self.pairs, quantum, |pair| read(pair.lobe(), pair.tree() as usize, pair.cell));
-        gathered.resolve(&self.own(), quantum)
+        let mut lobes: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
+        let estimate = |pair: &Pair| read(pair.lobe(), pair.tree() as usize, pair.cell);
+        products(&self.pairs, quantum, estimate, |pair, product| {
+            match lobes.last_mut() {
+                Some((slot, sums)) if *slot == pair.slot() => add(&mut sums[pair.lobe() as usize], &product),
+                _ => {
+                    let mut sums = [[0; 3]; 2];
+                    sums[pair.lobe() as usize] = product;
+                    lobes.push((pair.slot(), sums));
+                }
+            };
+        });
+        let lobes = lobes.into_iter().map(|(slot, sums)| (slot, sums.map(|sum| radiance(sum, quantum))));
+        resolve(lobes, &self.own(), quantum)
     }
 }
 
-/// What slots have read from cells, by slot: through diffuse lobes and through glossy ones.
+/// Calls `take` with what sorted pairs read when `read` tells the estimate of a pair's cell: a pair of each slot and cell,
+/// and throughput times estimate. All pairs of a tree come at once.
 ///
-/// Products of throughput and estimate are rounded one by one and summed as integers: the order of cells within a slot,
-/// which depends on who met them first, does not count, nor that of trees.
-#[derive(Debug, Default)]
-pub(crate) struct Gathered(Vec<(u32, [[i128; 3]; 2])>);
-
-impl Gathered {
-    /// Adds what sorted pairs read when `read` tells the estimate of a pair's cell. All pairs of a tree come at once.
-    pub fn add(&mut self, pairs: &[Pair], quantum: &Quantum, read: impl Fn(&Pair) -> [f32; 3]) {
-        let scale = 2f64.powi(RESOLVED_BITS) / quantum.radiance();
-        let sums = &mut self.0;
-        let before = sums.len();
-        // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
-        // where the overflow came does not count either.
-        for same in pairs.chunk_by(|a, b| a.order() == b.order()) {
-            let pair = &same[0];
-            let throughput: [i64; 3] = std::array::from_fn(|c| same.iter().map(|p| i64::from(p.throughput[c])).sum());
-            if sums[before..].last().is_none_or(|(slot, _)| *slot != pair.slot()) {
-                sums.push((pair.slot(), Default::default()));
-            }
-            let Some((_, lobes)) = sums.last_mut() else { continue };
-            for ((sum, throughput), x) in lobes[pair.lobe() as usize].iter_mut().zip(throughput).zip(read(pair)) {
-                *sum += whole(throughput as f64 * f64::from(x) * scale);
-            }
-        }
-        if before == 0 {
-            return;
-        }
-        // Two sorted runs.
-        sums.sort_by_key(|(slot, _)| *slot);
-        sums.dedup_by(|(slot, next), (kept, lobes)| {
-            let same = slot == kept;
-            if same {
-                let lobes = lobes.as_flattened_mut().iter_mut();
-                lobes.zip(next.as_flattened()).for_each(|(sum, x)| *sum += x);
-            }
-            same
-        });
+/// Products are rounded one by one, to be summed as integers: the order of cells within a slot, which depends on who met
+/// them first, does not count, nor that of trees.
+fn products(
+    pairs: &[Pair],
+    quantum: &Quantum,
+    read: impl Fn(&Pair) -> [f32; 3],
+    mut take: impl FnMut(&Pair, [i128; 3]),
+) {
+    let scale = 2f64.powi(RESOLVED_BITS) / quantum.radiance();
+    // What overflowed one pair is in others beside it: all of a cell's throughput is summed before it is used, so that
+    // where the overflow came does not count either.
+    for same in pairs.chunk_by(|a, b| a.order() == b.order()) {
+        let throughput: [i64; 3] = std::array::from_fn(|c| same.iter().map(|p| i64::from(p.throughput[c])).sum());
+        let estimate = read(&same[0]);
+        take(&same[0], std::array::from_fn(|c| whole(throughput[c] as f64 * f64::from(estimate[c]) * scale)));
     }
+}
 
-    /// What every slot gets, with its own sums.
-    pub fn resolve(&self, own: &[(u32, Own)], quantum: &Quantum) -> Vec<(u32, Resolved)> {
-        let unit = quantum.radiance() * 2f64.powi(-RESOLVED_BITS - THROUGHPUT_BITS);
-        let radiance = |sum: [i128; 3]| (DVec3::from_array(sum.map(float)) * unit).as_vec3();
-        let own_radiance = |sum: [i64; 3]| {
-            (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
-        };
-        let resolved = |[diffuse, glossy]: [[i128; 3]; 2], own: &Own| Resolved {
-            diffuse: radiance(diffuse) + own_radiance(own.unfiltered[0]),
-            glossy: radiance(glossy) + own_radiance(own.unfiltered[1]),
-            glossy_own: own.glossy.map(own_radiance),
-        };
-        // Both lists are by slot, and a slot may be in one alone.
-        let mut own = own.iter().peekable();
-        let mut slots = Vec::with_capacity(self.0.len());
-        for &(slot, lobes) in &self.0 {
-            while let Some((slot, own)) = own.next_if(|(at, _)| *at < slot) {
-                slots.push((*slot, resolved(Default::default(), own)));
-            }
-            let own = own.next_if(|(at, _)| *at == slot).map_or(Own::default(), |(_, own)| *own);
-            slots.push((slot, resolved(lobes, &own)));
-        }
-        slots.extend(own.map(|(slot, own)| (*slot, resolved(Default::default(), own))));
-        slots
+fn add(sum: &mut [i128; 3], other: &[i128; 3]) {
+    sum.iter_mut().zip(other).for_each(|(sum, x)| *sum += x);
+}
+
+/// Adds what sorted pairs of a tree read, when `read` tells the estimate of a pair's cell, to the sums of slots from `first`
+/// on.
+pub(crate) fn gather(
+    pairs: &[Pair],
+    quantum: &Quantum,
+    read: impl Fn(&Pair) -> [f32; 3],
+    first: u32,
+    sums: &mut [[i128; 3]],
+) {
+    products(pairs, quantum, read, |pair, product| add(&mut sums[(pair.slot() - first) as usize], &product));
+}
+
+/// What a slot gets: what it has read through diffuse lobes and through glossy ones, and its own sums.
+pub(crate) fn resolved([diffuse, glossy]: [Vec3; 2], own: &Own, quantum: &Quantum) -> Resolved {
+    let own_radiance = |sum: [i64; 3]| {
+        (DVec3::from_array(sum.map(|x| x as f64)) * quantum.radiance() * 2f64.powi(OWN_SHIFT)).as_vec3()
+    };
+    Resolved {
+        diffuse: diffuse + own_radiance(own.unfiltered[0]),
+        glossy: glossy + own_radiance(own.unfiltered[1]),
+        glossy_own: own.glossy.map(own_radiance),
     }
+}
+
+/// The same of all slots, from two lists by slot of which either may lack slots of the other.
+fn resolve(
+    lobes: impl Iterator<Item = (u32, [Vec3; 2])>,
+    own: &[(u32, Own)],
+    quantum: &Quantum,
+) -> Vec<(u32, Resolved)> {
+    let mut own = own.iter().peekable();
+    let mut slots = Vec::with_capacity(lobes.size_hint().0);
+    for (slot, lobes) in lobes {
+        while let Some((slot, own)) = own.next_if(|(at, _)| *at < slot) {
+            slots.push((*slot, resolved(Default::default(), own, quantum)));
+        }
+        let own = own.next_if(|(at, _)| *at == slot).map_or(Own::default(), |(_, own)| *own);
+        slots.push((slot, resolved(lobes, &own, quantum)));
+    }
+    slots.extend(own.map(|(slot, own)| (*slot, resolved(Default::default(), own, quantum))));
+    slots
+}
+
+/// Radiance of a sum of products.
+pub(crate) fn radiance(sum: [i128; 3], quantum: &Quantum) -> Vec3 {
+    let unit = quantum.radiance() * 2f64.powi(-RESOLVED_BITS - THROUGHPUT_BITS);
+    (DVec3::from_array(sum.map(float)) * unit).as_vec3()
 }
 
 /// ⌊x⌋ of a positive number; nearly all are short, for which there are instructions.

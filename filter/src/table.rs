@@ -70,16 +70,6 @@ impl<K: Key> Default for Table<K> {
 }
 
 impl<K: Key> Table<K> {
-    /// A table of cells that are all different.
-    pub fn from_cells(cells: Vec<(K, WideSums)>) -> Self {
-        let mut table = Self::default();
-        for (key, sums) in cells {
-            let number = table.push(key);
-            table.merge(number, &sums);
-        }
-        table
-    }
-
     /// Number of the cell of `key`, which is made if there is none.
     #[inline]
     pub fn cell(&mut self, key: K) -> u32 {
@@ -138,8 +128,7 @@ impl<K: Key> Table<K> {
 
     #[cold]
     fn grow(&mut self) {
-        // Twice as long, or as long as it takes where there never were slots.
-        let length = (2 * self.slots.len()).max(2 * (self.len + 1)).max(64).next_power_of_two();
+        let length = (2 * self.slots.len()).max(64);
         let mask = length as u32 - 1;
         self.slots = vec![0; length];
         for number in 0..self.len as u32 {

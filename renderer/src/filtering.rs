@@ -18,8 +18,9 @@ pub use blend::Blend;
 pub use settings::SettingError;
 pub use tile::{Keep, Keeper, Nothing, Paths, Selection, Watching};
 
-use crate::film::{Aov, AovSet, Film, FilterMap, Layer, TILE};
+use crate::film::{Aov, AovSet, Film, FilterMap, Image, Layer, TILE, tile_count, tile_slots};
 use crate::math::Rgb;
+use crate::world::Bounds;
 
 /// How a frame is filtered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -293,10 +294,10 @@ impl FrameFilter {
 
     /// Gives the film its filtered values, as of now.
     pub fn develop(&mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
-        let expose = |radiance: Vec3| surroundings.response * radiance;
+        let expose = expose(surroundings);
         match &mut self.sharing {
             Sharing::Talk(talk, _) => {
-                let resolved = by_slot(film, talk.resolve());
+                let resolved = by_slot(film, 0, talk.resolve());
                 let value = |at| {
                     let sum = resolved[film.index(at)];
                     let prefix = film.layer(Layer::Prefix, at).unwrap_or_default();
@@ -310,7 +311,7 @@ impl FrameFilter {
             Sharing::Adaptive(adaptive, blend) => {
                 let resolved = adaptive.resolve();
                 if film.outputs().aovs.contains(Aov::FilterCell) {
-                    film.set_map(FilterMap::Cell, by_slot(film, adaptive.cell_sides()));
+                    film.set_map(FilterMap::Cell, by_slot(film, 0, adaptive.cell_sides()));
                 }
                 blend_into(film, resolved, blend, self.coarse, expose);
                 Report::Adaptive(adaptive.report())
@@ -325,59 +326,111 @@ impl FrameFilter {
             Sharing::Talk(..) => self.develop(surroundings, film),
             Sharing::Adaptive(mut adaptive, blend) => {
                 if film.outputs().aovs.contains(Aov::FilterCell) {
-                    film.set_map(FilterMap::Cell, by_slot(film, adaptive.cell_sides()));
+                    film.set_map(FilterMap::Cell, by_slot(film, 0, adaptive.cell_sides()));
                 }
                 let (resolved, report) = adaptive.finish();
-                blend_into(film, resolved, &blend, self.coarse, |radiance| surroundings.response * radiance);
+                blend_into(film, resolved, &blend, self.coarse, expose(surroundings));
                 Report::Adaptive(report)
             }
         }
     }
 }
 
-/// A frame's filter that is resolved from stored sums, tree by tree.
+/// A frame's filter that is resolved from stored sums, tree by tree, and then band by band.
 pub struct Merging {
     sums: filter::Merging,
     blend: Blend,
-    coarse: f32,
+    surroundings: Surroundings,
+    bounds: Bounds,
+    /// Of all bands so far.
+    pixels: Vec<blend::Pixel>,
 }
 
 impl Merging {
-    /// A filter over so many tiles, of a frame with these outputs; `None` if it has no filter, or one that cannot be stored.
-    pub fn new(filtering: &Filtering, surroundings: &Surroundings, tiles: usize, aovs: AovSet) -> Option<Self> {
+    /// A filter of a frame of these pixels and outputs; `None` if it has no filter, or one that cannot be stored.
+    pub fn new(filtering: &Filtering, surroundings: &Surroundings, bounds: Bounds, aovs: AovSet) -> Option<Self> {
         let Filtering::Adaptive(_, blend) = *filtering else { return None };
         let measured = aovs.contains(Aov::FilterCell);
-        let sums = filter::Merging::new(&filtering.adaptive(surroundings)?, tiles, measured);
-        Some(Self { sums, blend, coarse: surroundings.unit * COARSE })
+        let sums = filter::Merging::new(&filtering.adaptive(surroundings)?, tile_count(bounds), TILE * TILE, measured);
+        Some(Self { sums, blend, surroundings: *surroundings, bounds, pixels: Vec::new() })
     }
 
-    /// Adds a tree, by tile.
-    pub fn add_tree(&mut self, branches: Vec<Branch>) {
-        self.sums.add_tree(branches);
+    /// Adds the next tiles of a tree: trees in their order, all tiles of each.
+    pub fn add(&mut self, branches: Vec<Branch>) {
+        self.sums.add(branches);
     }
 
-    /// What each pixel of a tile gets, once all trees were added.
-    pub fn resolve(&self, tile: usize, slots: &Slots) -> Vec<(u32, Resolved)> {
-        self.sums.resolve(tile, slots)
+    /// Ends a tree.
+    pub fn end_tree(&mut self) {
+        self.sums.end_tree();
     }
 
-    /// Gives the film its filtered values from what all its tiles got. `paths` are as [`FrameFilter::paths`] counts them.
-    pub fn finish(
-        self,
-        paths: [u64; 2],
-        resolved: Vec<Vec<(u32, Resolved)>>,
-        surroundings: &Surroundings,
-        film: &mut Film,
-    ) -> Report {
-        let Self { sums, blend, coarse } = self;
-        let report = Report::Adaptive(sums.report(paths));
-        if let Some(sides) = sums.cell_sides() {
-            film.set_map(FilterMap::Cell, by_slot(film, sides));
+    /// Takes the next band of the frame, once all trees were added: a film of some rows of tiles, and what the filter keeps
+    /// of its pixels, by tile. The film gets its maps, but for what is only known of all pixels.
+    pub fn band(&mut self, first_tile: usize, slots: &[Slots], film: &mut Film) {
+        let tiles = first_tile..first_tile + slots.len();
+        let base = tile_slots(first_tile).start;
+        let aovs = film.outputs().aovs;
+        if aovs.contains(Aov::FilterCell) {
+            let sides = tiles.clone().map(|tile| self.sums.cell_sides(tile).unwrap_or_default());
+            film.set_map(FilterMap::Cell, by_slot(film, base, sides.collect()));
         }
+        if aovs.contains(Aov::FilterBlend) {
+            film.set_map(FilterMap::Blend, vec![0.0; film.slots()]);
+        }
+        let of_tile = |(tile, slots): (usize, &Slots)| self.sums.resolve(tile, slots);
+        let resolved: Vec<Vec<Resolved>> = tiles.into_par_iter().zip(slots).map(of_tile).collect();
+        let resolved = resolved.concat();
+        // Room for all, but not before the trees are done with theirs.
+        self.pixels.reserve_exact(self.bounds.area() as usize - self.pixels.len());
+        self.pixels.par_extend(blend_pixels(film, &resolved, expose(&self.surroundings)));
+    }
+
+    /// Gives the image of all bands its filtered values. `paths` are as [`FrameFilter::paths`] counts them.
+    pub fn finish(self, paths: [u64; 2], image: &mut Image) -> Report {
+        let Self { sums, blend, surroundings, bounds, pixels } = self;
+        let report = Report::Adaptive(sums.report(paths));
         drop(sums);
-        blend_into(film, resolved, &blend, coarse, |radiance| surroundings.response * radiance);
+        let frame = blend::Frame { width: bounds.width() as usize, pixels };
+        let (values, shares) = blended(frame, &blend, surroundings.unit * COARSE, expose(&surroundings));
+        image.set_radiance(&values);
+        image.set_channel(Aov::FilterBlend.name(), &shares);
         report
     }
+}
+
+/// Film RGB of scene RGB.
+fn expose(surroundings: &Surroundings) -> impl Fn(Vec3) -> Vec3 + Copy + Send + Sync + use<> {
+    let response = surroundings.response;
+    move |radiance| response * radiance
+}
+
+/// All that is to be blended, row by row, given what each pixel got by its index.
+fn blend_pixels(
+    film: &Film,
+    resolved: &[Resolved],
+    expose: impl Fn(Vec3) -> Vec3 + Send + Sync,
+) -> impl IndexedParallelIterator<Item = blend::Pixel> {
+    let bounds = film.bounds();
+    let width = bounds.width() as usize;
+    (0..bounds.area() as usize).into_par_iter().map(move |i| {
+        let at = [bounds.min[0] + (i % width) as u32, bounds.min[1] + (i / width) as u32];
+        blend::Pixel::new(film, at, &resolved[film.index(at)], &expose)
+    })
+}
+
+/// The values of the pixels, and the shares of their own, unfiltered ones.
+fn blended(frame: blend::Frame, blend: &Blend, coarse: f32, expose: impl Fn(Vec3) -> Vec3) -> (Vec<Rgb>, Vec<f32>) {
+    let (mut values, mut shares) = frame.blend(blend);
+    let coarse = expose(Vec3::splat(coarse)).max_element();
+    // At the other end, sums of what fits singly need not fit.
+    let usable = |value: Rgb| value.is_finite() && value.max_element() >= coarse;
+    (&mut values, &mut shares, &frame.pixels).into_par_iter().for_each(|(value, share, pixel)| {
+        if !usable(*value) {
+            (*value, *share) = (pixel.own(), 1.0);
+        }
+    });
+    (values, shares)
 }
 
 /// Gives the film its filtered values from what each slot got.
@@ -386,29 +439,17 @@ fn blend_into(
     resolved: Vec<Vec<(u32, Resolved)>>,
     blend: &Blend,
     coarse: f32,
-    expose: impl Fn(Vec3) -> Vec3 + Sync,
+    expose: impl Fn(Vec3) -> Vec3 + Copy + Send + Sync,
 ) {
-    let resolved = by_slot(film, resolved);
-    let bounds = film.bounds();
-    let (width, count) = (bounds.width() as usize, bounds.area() as usize);
-    let at = |i: usize| [bounds.min[0] + (i % width) as u32, bounds.min[1] + (i / width) as u32];
-    let pixel = |i| blend::Pixel::new(film, at(i), &resolved[film.index(at(i))], &expose);
-    let frame = blend::Frame { width, pixels: (0..count).into_par_iter().map(pixel).collect() };
+    let resolved = by_slot(film, 0, resolved);
+    let width = film.bounds().width() as usize;
+    let frame = blend::Frame { width, pixels: blend_pixels(film, &resolved, expose).collect() };
     drop(resolved);
-    let (mut values, mut shares) = frame.blend(blend);
-    drop(frame);
-    let coarse = expose(Vec3::splat(coarse)).max_element();
-    // At the other end, sums of what fits singly need not fit.
-    let usable = |value: &Rgb| value.is_finite() && value.max_element() >= coarse;
-    values.par_iter_mut().zip(&mut shares).enumerate().filter(|(_, (value, _))| !usable(value)).for_each(
-        |(i, (value, share))| {
-            (*value, *share) = (film.pixel(at(i)).mean().as_vec3(), 1.0);
-        },
-    );
+    let (values, shares) = blended(frame, blend, coarse, expose);
     film.set_filtered(&values);
     if film.outputs().aovs.contains(Aov::FilterBlend) {
         let mut by_index = vec![0.0; film.slots()];
-        bounds.pixels().zip(shares).for_each(|(at, share)| by_index[film.index(at)] = share);
+        film.bounds().pixels().zip(shares).for_each(|(at, share)| by_index[film.index(at)] = share);
         film.set_map(FilterMap::Blend, by_index);
     }
 }
@@ -433,13 +474,13 @@ impl Blocks {
 /// black: in the shade of a frame in which something is a million times as bright, pixels keep their own values.
 const COARSE: f32 = 1.0 / (1 << 20) as f32;
 
-/// What each pixel of a film got, by its index.
-fn by_slot<T: Clone + Default + Send>(film: &Film, parts: Vec<Vec<(u32, T)>>) -> Vec<T> {
+/// What each pixel of a film got, by its index: of tiles whose slots are numbered from `base`.
+fn by_slot<T: Clone + Default + Send>(film: &Film, base: u32, parts: Vec<Vec<(u32, T)>>) -> Vec<T> {
     let mut resolved = vec![T::default(); film.slots()];
     // A tile's pixels are numbered one after the other.
     let tiles = resolved.par_chunks_mut((TILE * TILE) as usize).zip(parts).enumerate();
     tiles.for_each(|(tile, (resolved, part))| {
-        let first = tile as u32 * TILE * TILE;
+        let first = base + tile_slots(tile).start;
         part.into_iter().for_each(|(slot, value)| resolved[(slot - first) as usize] = value);
     });
     resolved

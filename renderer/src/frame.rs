@@ -81,8 +81,20 @@ impl FrameDescription {
 
     /// An empty film for it.
     pub fn film(&self) -> Film {
+        self.band_film(self.bounds)
+    }
+
+    /// An empty film for a band of it.
+    pub fn band_film(&self, band: Bounds) -> Film {
         let filtered = self.filtering != Filtering::None;
-        Film::new(self.resolution, self.bounds, self.outputs(), filtered).with_overscan(self.overscan)
+        Film::new(self.resolution, band, self.outputs(), filtered).with_overscan(self.overscan)
+    }
+
+    /// Its rows of tiles, from the top.
+    pub fn bands(&self) -> impl Iterator<Item = Bounds> + use<> {
+        let Bounds { min, max } = self.bounds;
+        let band = move |top: u32| Bounds { min: [min[0], top], max: [max[0], max[1].min(top + film::TILE)] };
+        (min[1]..max[1]).step_by(film::TILE as usize).map(band)
     }
 
     /// Number of tiles of its film.

@@ -15,6 +15,8 @@ pub mod surface;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use embree::{CommittedScene, Hit};
 use glam::{Vec2, Vec3};
 
@@ -70,10 +72,11 @@ impl Geometry {
     pub(crate) fn new(
         scene: CommittedScene,
         surfaces: Vec<Surface>,
-        instances: Vec<Instance>,
+        mut instances: Vec<Instance>,
         placed: u32,
         triangle_test: TriangleTest,
     ) -> Self {
+        (0..).zip(&mut instances).for_each(|(number, instance)| instance.number = number);
         Self { scene, surfaces, instances, placed, triangle_test }
     }
 
@@ -106,14 +109,24 @@ impl Geometry {
     /// Number of triangles, patches, quadrics and curve segments: with every instance counted, and in memory.
     pub fn primitive_counts(&self) -> (u64, u64) {
         let count = |surfaces: &[Surface]| surfaces.iter().map(|s| s.primitives.len() as u64).sum::<u64>();
+        let placed = &self.surfaces[self.placed()];
+        let instanced = self.instanced().map(|object| count(&self.surfaces[object]));
+        (count(placed) + instanced.sum::<u64>(), count(&self.surfaces))
+    }
+
+    /// Indices of the surfaces that are not instanced.
+    pub fn placed(&self) -> Range<usize> {
+        0..self.placed as usize
+    }
+
+    /// Indices of the surfaces of each instance's object.
+    pub fn instanced(&self) -> impl Iterator<Item = Range<usize>> {
         // An object's surfaces end where the next object's begin.
         let mut ends: Vec<usize> = self.instances.iter().map(|i| i.first_surface as usize).collect();
         ends.push(self.surfaces.len());
         ends.sort_unstable();
-        let object = |first: usize| first..ends[ends.partition_point(|&end| end <= first)];
-        let placed = &self.surfaces[..self.placed as usize];
-        let instanced = self.instances.iter().map(|i| count(&self.surfaces[object(i.first_surface as usize)]));
-        (count(placed) + instanced.sum::<u64>(), count(&self.surfaces))
+        let object = move |first: usize| first..ends[ends.partition_point(|&end| end <= first)];
+        self.instances.iter().map(move |instance| object(instance.first_surface as usize))
     }
 
     /// The surface at a hit of `ray`.
@@ -176,6 +189,18 @@ impl Geometry {
 }
 
 impl SurfaceInteraction<'_> {
+    /// Index of the instance that it belongs to.
+    #[inline]
+    pub fn instance(&self) -> Option<u32> {
+        self.instance.map(|instance| instance.number)
+    }
+
+    /// Number of the surface in the object that is instanced, or else in the [`Geometry`].
+    #[inline]
+    pub fn number_in_object(&self) -> u32 {
+        self.geometry - self.instance.map_or(0, |instance| instance.first_surface)
+    }
+
     /// Texture coordinates.
     #[inline]
     pub fn uv(&self) -> Vec2 {

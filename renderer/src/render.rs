@@ -16,8 +16,7 @@ use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
 use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Samples};
-use crate::integrator::{self, AlphaTested, Counters, Opaque, Queries, Sample, Unrecorded};
-use crate::part;
+use crate::integrator::{self, AlphaTested, Counters, Ids, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
 use crate::world::{Techniques, World};
@@ -214,14 +213,6 @@ impl Frame {
     }
 }
 
-impl From<part::Merged> for Frame {
-    fn from(merged: part::Merged) -> Self {
-        let part::Merged { film, description, samples, counters, report } = merged;
-        let statistics = Statistics { counters, filter: report, ..Statistics::default() };
-        Self { film, description, samples, statistics }
-    }
-}
-
 /// What a job took.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
@@ -261,8 +252,8 @@ pub struct Prepared {
     pub statistics: Statistics,
     /// Owns the BVH's memory.
     pub device: embree::Device,
-    /// Ids of the names of objects and materials, by surface; empty where no matte shows them.
-    ids: Vec<[u32; 2]>,
+    /// Ids of the names of objects and materials, where a matte shows them.
+    ids: Option<Ids>,
 }
 
 /// Renders one job.
@@ -354,8 +345,9 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
 
     let mattes = [film::Aov::CryptoObject, film::Aov::CryptoMaterial].map(|aov| aovs.contains(aov));
-    let names = if mattes.contains(&true) { Names::new(&description, &world.geometry) } else { Names::default() };
-    let ids = names.objects.iter().zip(&names.materials).map(|(object, material)| [id(object), id(material)]).collect();
+    let names = mattes.contains(&true).then(|| Names::new(&description, &world.geometry));
+    let ids = names.as_ref().map(ids);
+    let names = names.unwrap_or_default();
     let manifest = |(shown, names): (bool, &[Arc<str>])| if shown { sorted(names) } else { Vec::new() };
     let named = [(mattes[0], &names.objects[..]), (mattes[1], &names.materials[..])];
 
@@ -392,6 +384,13 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     Ok(Prepared { world, description, statistics, device, ids })
 }
 
+/// The ids of names.
+fn ids(names: &Names) -> Ids {
+    let names_of = names.objects.iter().zip(&names.materials);
+    let surfaces = names_of.map(|(object, material)| [id(object), id(material)]).collect();
+    Ids { surfaces, instances: names.instances.clone() }
+}
+
 /// Each name once.
 fn sorted(names: &[Arc<str>]) -> Vec<Arc<str>> {
     names.iter().cloned().collect::<BTreeSet<_>>().into_iter().collect()
@@ -424,14 +423,15 @@ pub fn trace(
     frame.description = prepared.description;
     let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
     let Prepared { world, mut statistics, ids, .. } = prepared;
+    let ids = ids.as_ref();
     statistics.film_bytes = frame.film_bytes();
     match world.geometry.alpha_test(&world.textures) {
         None => {
-            trace_passes(&world, &Opaque(world.geometry.scene()), &ids, &mut frame, &mut statistics, observer, &over)
+            trace_passes(&world, &Opaque(world.geometry.scene()), ids, &mut frame, &mut statistics, observer, &over)
         }
         Some(alpha) => {
             let queries = AlphaTested { scene: world.geometry.scene(), alpha };
-            trace_passes(&world, &queries, &ids, &mut frame, &mut statistics, observer, &over);
+            trace_passes(&world, &queries, ids, &mut frame, &mut statistics, observer, &over);
         }
     }
     statistics.counters = frame.counters;
@@ -470,7 +470,7 @@ impl Traced {
 fn trace_passes<Q: Queries + Sync>(
     world: &World,
     queries: &Q,
-    ids: &[[u32; 2]],
+    ids: Option<&Ids>,
     frame: &mut Accumulation,
     statistics: &mut Statistics,
     observer: &dyn Observer,
@@ -496,7 +496,7 @@ struct Passes<'a, Q> {
     queries: &'a Q,
     sampler: Sampler,
     /// See [`Prepared::ids`].
-    ids: &'a [[u32; 2]],
+    ids: Option<&'a Ids>,
     progress: Progress<'a>,
 }
 

@@ -116,7 +116,7 @@ fn mattes_cover_what_is_seen_and_know_it_by_name() {
     let layers = ["CryptoObject", "CryptoMaterial"];
     let frame = run(&Job { spp: Some(64), ..job(&scene, &layers) });
     let image = frame.film.image();
-    let known = [vec!["ball", "names.pbrt:28", "tree"], vec!["names.pbrt:27", "red", "white"]];
+    let known = [vec!["ball", "names.pbrt:28", "tree.1", "tree.2"], vec!["names.pbrt:27", "red", "white"]];
     for ((layer, names), known) in layers.iter().zip(&frame.description.names).zip(known) {
         assert_eq!(names.iter().map(|name| &**name).collect::<Vec<_>>(), known);
         let mut seen = std::collections::BTreeSet::new();
@@ -133,6 +133,12 @@ fn mattes_cover_what_is_seen_and_know_it_by_name() {
     let middle = 16 * 48 + 24;
     assert_eq!(ranks(&image, "CryptoObject", middle)[0], (cryptomatte::id("ball"), 1.0));
     assert_eq!(ranks(&image, "CryptoMaterial", middle)[0], (cryptomatte::id("red"), 1.0));
+    // The trees right and left of it are two, of one material.
+    for (x, tree) in [(10, "tree.2"), (37, "tree.1")] {
+        let pixel = 16 * 48 + x;
+        assert_eq!(ranks(&image, "CryptoObject", pixel)[0], (cryptomatte::id(tree), 1.0));
+        assert_eq!(ranks(&image, "CryptoMaterial", pixel)[0], (cryptomatte::id("white"), 1.0));
+    }
 }
 
 #[test]

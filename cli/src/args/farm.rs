@@ -59,6 +59,9 @@ pub struct SlurmArguments {
     /// Folder to write the scripts to; parts, checkpoints and logs will be in it too, so every machine must reach it
     #[arg(long, value_name = "DIR")]
     pub folder: PathBuf,
+    /// How often the slices of a frame are tried again while some of them fail
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=9))]
+    pub retries: u32,
 }
 
 /// What is rendered, and how it is cut.

@@ -6,7 +6,8 @@ use rayon::ThreadPool;
 use renderer::error::{Goal, Watch};
 use renderer::film::{Aov, exr};
 use renderer::filtering::Filtering;
-use renderer::part::{Part, PartError, Parts};
+use renderer::frame::FrameDescription;
+use renderer::part::{Merged, Part, PartError, Parts};
 use renderer::render::{Frame, Statistics, Traced};
 
 use crate::args::MergeArguments;
@@ -82,34 +83,53 @@ fn develop(
             missing.start, missing.end, parts.description.spp
         )));
     }
-    let (mut frame, watch) = pool.install(|| add_up(parts)).map_err(failure)?;
-    let error = watch.and_then(|watch| watch.finish(&mut frame.film));
-    if let Some(error) = &error {
-        log.info(&stats::Error::of(error).summary());
-    }
+    let sums = pool.install(|| add_up(parts)).map_err(failure)?;
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }
-    let attributes = metadata::of_frame(&frame, error.as_ref(), arguments.provenance);
-    exr::write_as(&frame.film, attributes, &encoding, file.target())
-        .map_err(|error| Failure::Output(error.to_string()))?;
-    Ok(())
+    let provenance = |statistics| Some(statistics).filter(|_| arguments.provenance);
+    let written = match sums {
+        Sums::Image(merged) => {
+            let Merged { image, description, samples, counters, .. } = *merged;
+            let statistics = Statistics { counters, ..Statistics::default() };
+            let attributes = metadata::of_frame(&description, &samples, None, provenance(&statistics));
+            exr::write_image(&image, attributes, &encoding, file.target())
+        }
+        Sums::Frame(mut frame, watch) => {
+            let error = watch.finish(&mut frame.film);
+            if let Some(error) = &error {
+                log.info(&stats::Error::of(error).summary());
+            }
+            let Frame { film, description, samples, statistics } = &*frame;
+            let attributes = metadata::of_frame(description, samples, error.as_ref(), provenance(statistics));
+            exr::write_as(film, attributes, &encoding, file.target())
+        }
+    };
+    written.map(drop).map_err(|error| Failure::Output(error.to_string()))
 }
 
-/// The frame that parts add up to, and who has looked at its error. Without a filter the sums tell it as they do in a render
-/// of the whole; with one the frame is compared with what it was after some of the parts, if somebody asks: then all sums
-/// are held.
-fn add_up(parts: Parts) -> Result<(Frame, Option<Watch>), PartError> {
+/// What parts add up to.
+enum Sums {
+    /// A filtered image.
+    Image(Box<Merged>),
+    /// All sums, and who has looked at their error.
+    Frame(Box<Frame>, Watch),
+}
+
+/// Adds parts up. Without a filter the sums tell the error as they do in a render of the whole; with one the frame is
+/// compared with what it was after some of the parts, if somebody asks: then all sums are held.
+fn add_up(parts: Parts) -> Result<Sums, PartError> {
+    let FrameDescription { filtering, aovs, .. } = &parts.description;
+    if *filtering != Filtering::None && !aovs.contains(Aov::Error) {
+        return Ok(Sums::Image(Box::new(parts.develop()?)));
+    }
     let watch = Watch::new(Goal::default());
-    if parts.description.filtering == Filtering::None {
-        return Ok((parts.develop()?.into(), Some(watch)));
-    }
-    if !parts.description.aovs.contains(Aov::Error) {
-        return Ok((parts.develop()?.into(), None));
-    }
-    let frame = parts.accumulate(|frame| watch.pass_done(frame))?;
+    let frame = match filtering {
+        Filtering::None => parts.sum()?,
+        _ => parts.accumulate(|frame| watch.pass_done(frame))?,
+    };
     let statistics = Statistics { counters: frame.counters, ..Statistics::default() };
-    Ok((Traced { frame, statistics }.develop(), Some(watch)))
+    Ok(Sums::Frame(Box::new(Traced { frame, statistics }.develop()), watch))
 }
 
 /// What is wrong with a part is wrong with the input, unless it is the one to be written.

@@ -55,6 +55,19 @@ fn the_same_job_gives_the_same_bytes_on_any_number_of_threads() {
 }
 
 #[test]
+fn no_file_is_written_over_another() {
+    let bench = bench();
+    for options in [["--checkpoint", "a.exr"], ["--checkpoint", "./a.exr"], ["--stats", "a.exr"]] {
+        let run = bench.run(&[&["render", "scene.pbrt", "-o", "a.exr"], &options[..]].concat());
+        assert!(run.code == 2 && run.stderr.contains("name two files"), "{options:?}: {}", run.stderr);
+    }
+    // A checkpoint is deleted when the picture is there.
+    let run = bench.run(&["render", "scene.pbrt", "-o", "a.exr", "--checkpoint", "scene.pbrt"]);
+    assert!(run.code == 3 && run.stderr.contains("a file of its own"), "{}", run.stderr);
+    assert_eq!((bench.files(), bytes(&bench, "scene.pbrt")), (vec!["scene.pbrt".to_owned()], SCENE.into()));
+}
+
+#[test]
 fn crops_are_the_same_pixels_in_a_window_of_the_frame() {
     let bench = bench();
     // Filtered, pixels within the window would have no neighbours beyond it.

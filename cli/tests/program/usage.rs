@@ -35,7 +35,10 @@ fn a_wrong_setting_of_the_filter_is_answered_by_those_there_are() {
         bench.fail(&[&["render", "none.pbrt", "-o", "a.exr"], arguments].concat(), 2, words);
     };
     fail(&["--filter", "best"], &["best", "none", "talk", "adaptive"]);
-    fail(&["--filter-set", "tree=3"], &["\"adaptive\" has no setting \"tree\"", "trees (1 to 8)", "leaf (above 0)"]);
+    fail(
+        &["--filter-set", "tree=3"],
+        &["\"adaptive\" has no setting \"tree\"", "trees (1 to 8)", "leaf (auto or above 0)"],
+    );
     fail(&["--filter-set", "leaf=1,trees=9"], &["trees cannot be \"9\": it must be 1 to 8"]);
     fail(&["--filter-set", "trees"], &["trees", "KEY=VALUE"]);
     fail(&["--filter", "talk", "--filter-set", "trees=3"], &["\"talk\" has no setting \"trees\"", "probes (1 to 255)"]);

@@ -164,7 +164,7 @@ impl Adaptive {
 /// Appends a table's cells by key; their numbers in that order, by their numbers in the table.
 fn store_cells<K: Key>(table: &Table<K>, words: &mut Vec<u64>) -> Vec<u32> {
     let mut order: Vec<(CellKey, u32)> = table.keys().zip(0..).collect();
-    order.sort_unstable();
+    order.sort_unstable_by_key(|(key, _)| *key);
     let mut numbers = vec![0; order.len()];
     for ((_, cell), number) in order.iter().zip(0..) {
         numbers[*cell as usize] = number;

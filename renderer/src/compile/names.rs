@@ -3,25 +3,28 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use crate::interaction::Geometry;
+use crate::interaction::{Geometry, Surface};
 use crate::scene::Span;
 use crate::scene::description::{Material, Scene, Shape, ShapeKind};
 
-/// Names by surface.
+/// Names of surfaces: of those that are not instanced, and then of each instance's.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// Of the objects that surfaces are of.
     pub objects: Vec<Arc<str>>,
     /// Of their materials.
     pub materials: Vec<Arc<str>>,
+    /// Where the surfaces of each instance begin.
+    pub instances: Vec<u32>,
 }
 
 impl Names {
     /// The names of a scene's surfaces.
     ///
-    /// A shape has the name of its parameter `name`, or that of the object that it is defined in, which all instances of the
-    /// object share, or that of its file. A material has that of its `MakeNamedMaterial`. What has no name is called after its
-    /// place in the scene file.
+    /// A shape has the name of its parameter `name`, or that of the object that it is defined in, or that of its file. A
+    /// material has that of its `MakeNamedMaterial`. What has no name is called after its place in the scene file. Instances
+    /// of an object are counted from 1, in their order in the scene, and the shapes of each have its number behind their
+    /// names: `tree.1`.
     pub fn new(scene: &Scene, geometry: &Geometry) -> Self {
         let mut places = scene.sources.places();
         let mut place = |span: Span| -> Arc<str> {
@@ -37,11 +40,28 @@ impl Names {
         let of_material = |material: &Material| material.name.as_deref().map(Arc::from);
         let materials: Vec<Arc<str>> =
             scene.materials.iter().map(|m| of_material(m).unwrap_or_else(|| place(m.span))).collect();
-        let surfaces = geometry.surfaces().iter();
-        Self {
-            objects: surfaces.clone().map(|surface| Arc::clone(&objects[&surface.span])).collect(),
-            materials: surfaces.map(|surface| Arc::clone(&materials[surface.material.index()])).collect(),
+
+        let mut names = Self::default();
+        let mut add = |surface: &Surface, object: Arc<str>| {
+            names.objects.push(object);
+            names.materials.push(Arc::clone(&materials[surface.material.index()]));
+        };
+        for surface in &geometry.surfaces()[geometry.placed()] {
+            add(surface, Arc::clone(&objects[&surface.span]));
         }
+        let mut instances = Vec::with_capacity(geometry.instances().len());
+        let mut next = geometry.placed().end as u32;
+        let mut copies: HashMap<usize, u32> = HashMap::new();
+        for object in geometry.instanced() {
+            instances.push(next);
+            next += object.len() as u32;
+            let copy = copies.entry(object.start).or_default();
+            *copy += 1;
+            for surface in &geometry.surfaces()[object] {
+                add(surface, format!("{}.{copy}", objects[&surface.span]).into());
+            }
+        }
+        Self { instances, ..names }
     }
 }
 

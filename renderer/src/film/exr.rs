@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use oiio::{Attribute, Channel, Compression, FileFormat, Format, Output, Window};
 
-use super::Film;
+use super::{Film, Image};
 use crate::draft::Draft;
 
 /// What keeps an image from being written.
@@ -93,16 +93,28 @@ pub fn write_as(
     encoding: &Encoding,
     path: &Path,
 ) -> Result<Losses, WriteError> {
-    let image = film.image();
-    let (bounds, [width, height]) = (film.bounds(), film.resolution());
+    write_image(&film.image(), attributes, encoding, path)
+}
+
+/// Writes an image to `path`, as [`write_as`] does a film's.
+///
+/// # Errors
+/// As [`write_as`].
+pub fn write_image(
+    image: &Image,
+    attributes: Vec<(String, Attribute)>,
+    encoding: &Encoding,
+    path: &Path,
+) -> Result<Losses, WriteError> {
+    let (bounds, [width, height]) = (image.bounds, image.resolution);
     let file_error = |why| WriteError::File { path: path.to_owned(), why };
     let draft = Draft::create(path).map_err(file_error)?;
     let output = Output {
         path: draft.path(),
         file_format: FileFormat::Exr,
         data_window: Window {
-            x: bounds.min[0] as i32 - film.overscan() as i32,
-            y: bounds.min[1] as i32 - film.overscan() as i32,
+            x: bounds.min[0] as i32 - image.overscan as i32,
+            y: bounds.min[1] as i32 - image.overscan as i32,
             width: bounds.width() as usize,
             height: bounds.height() as usize,
         },

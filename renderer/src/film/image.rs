@@ -4,6 +4,7 @@ use super::aov::Shown;
 use super::matte::RANKS;
 use super::{Aov, Film, FilterMap, Layer, Outputs};
 use crate::math::Rgb;
+use crate::world::Bounds;
 
 /// One channel of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +18,12 @@ pub struct Channel {
 /// Pixels by channel, row by row from the top: `values[(y * width + x) * channels + c]` over the film's bounds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
+    /// Width and height of the whole frame.
+    pub resolution: [u32; 2],
+    /// Column and row that are the frame's first.
+    pub overscan: u32,
+    /// The pixels that there are.
+    pub bounds: Bounds,
     /// Channels, in order.
     pub channels: Vec<Channel>,
     /// Values.
@@ -29,8 +36,15 @@ impl Film {
     /// The image of all sums so far: `R G B A` as halves, then the auxiliary channels as floats.
     pub fn image(&self) -> Image {
         let outputs = self.known_outputs();
-        let mut image = Image { channels: channels(&outputs), values: Vec::new(), clamped_negative: 0 };
         let (bounds, shown) = (self.bounds(), outputs.shown());
+        let mut image = Image {
+            resolution: self.resolution(),
+            overscan: self.overscan(),
+            bounds,
+            channels: channels(&outputs),
+            values: Vec::new(),
+            clamped_negative: 0,
+        };
         image.values.reserve_exact(bounds.area() as usize * image.channels.len());
         for at in bounds.pixels() {
             image.push_radiance(self.value(at), self.pixel(at).mean_alpha());
@@ -107,10 +121,47 @@ fn channels(outputs: &Outputs) -> Vec<Channel> {
 
 impl Image {
     fn push_radiance(&mut self, radiance: glam::DVec3, alpha: f64) {
-        let radiance = radiance.as_vec3();
-        self.clamped_negative += u64::from(radiance.min_element() < 0.0);
-        self.values.extend(radiance.max(Rgb::ZERO).to_array());
+        let radiance = self.shown(radiance.as_vec3());
+        self.values.extend(radiance);
         self.values.push((alpha as f32).clamp(0.0, 1.0));
+    }
+
+    /// What is written of a pixel's value.
+    fn shown(&mut self, radiance: Rgb) -> [f32; 3] {
+        self.clamped_negative += u64::from(radiance.min_element() < 0.0);
+        radiance.max(Rgb::ZERO).to_array()
+    }
+
+    /// The same with room for all pixels in `bounds`.
+    pub fn with_room_for(mut self, bounds: Bounds) -> Self {
+        let all = bounds.area() as usize * self.channels.len();
+        self.values.reserve_exact(all.saturating_sub(self.values.len()));
+        self
+    }
+
+    /// Appends the rows of an image of the same frame, which follow.
+    pub fn append(&mut self, band: Self) {
+        assert_eq!((self.bounds.max[1], &self.channels), (band.bounds.min[1], &band.channels), "bands of one image");
+        self.bounds.max = band.bounds.max;
+        self.values.extend(band.values);
+        self.clamped_negative += band.clamped_negative;
+    }
+
+    /// Sets what all pixels show, film RGB, row by row.
+    pub fn set_radiance(&mut self, values: &[Rgb]) {
+        self.clamped_negative = 0;
+        let channels = self.channels.len();
+        for (at, value) in values.iter().enumerate() {
+            let shown = self.shown(*value);
+            self.values[at * channels..][..3].copy_from_slice(&shown);
+        }
+    }
+
+    /// Sets one channel of all pixels, row by row, if the image has it.
+    pub fn set_channel(&mut self, name: &str, values: &[f32]) {
+        let channels = self.channels.len();
+        let Some(which) = self.channels.iter().position(|channel| channel.name == name) else { return };
+        self.values.chunks_exact_mut(channels).zip(values).for_each(|(pixel, value)| pixel[which] = *value);
     }
 }
 
@@ -119,7 +170,6 @@ mod tests {
     use super::super::{AovSet, Taken};
     use super::*;
     use crate::integrator::FirstHit;
-    use crate::world::Bounds;
 
     #[test]
     fn channels_and_values_agree_in_number_and_negative_lobes_are_clamped() {

@@ -24,6 +24,7 @@
 //! **Source**: the combiner of James and Stein \[James61\], \[Zheng22\] in its form for two halves, which is 1 − V/D with
 //! D = b + V; the nested windows and their standard error are ours.
 
+use std::collections::VecDeque;
 use std::ops::Add;
 
 use filter::Resolved;
@@ -31,7 +32,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::film::{Film, Layer};
-use crate::math::{Rgb, luminance, widened};
+use crate::math::{Rgb, Widening, luminance, widened};
 
 /// A pixel with all that speaks for and against its filtered value, film RGB.
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,6 +94,13 @@ impl Pixel {
     }
 }
 
+impl Pixel {
+    /// Its unfiltered value, film RGB.
+    pub fn own(&self) -> Rgb {
+        self.own
+    }
+}
+
 impl Frame {
     /// The blended image, and the share of the unfiltered one in each pixel.
     pub fn blend(&self, settings: &Blend) -> (Vec<Rgb>, Vec<f32>) {
@@ -102,18 +110,19 @@ impl Frame {
         // pixels: by its own, an error that brightens would excuse itself.
         let bright = |pixel: &Pixel| Vec2::new(luminance(pixel.base + pixel.glossy), 1.0);
         let bright = widened(&self.pixels.par_iter().map(bright).collect::<Vec<_>>(), self.width, 1);
-        let scale = |i: usize| (bright[i].x / bright[i].y).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
+        let scale = |bright: Vec2| (bright.x / bright.y).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
+        let scales: Vec<f32> = bright.into_par_iter().map(scale).collect();
         let glossy = weights(self, settings.doubt, |i| {
             let pixel = &self.pixels[i];
             let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
-            Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scale(i) }
+            Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scales[i] }
         });
         let filtered: Vec<Vec3> = (self.pixels.par_iter().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
         let whole = weights(self, settings.doubt, |i| {
             let pixel = &self.pixels[i];
-            Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scale(i) }
+            Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scales[i] }
         });
         let blended = (&self.pixels, &filtered, &whole)
             .into_par_iter()
@@ -167,7 +176,7 @@ const LARGEST: f32 = 1e8;
 
 impl Difference {
     /// What a pixel says, with the help of its neighbour if it has to.
-    fn evidence(&self, neighbour: &Self) -> Evidence {
+    fn evidence(&self, neighbour: impl Fn() -> Self) -> Evidence {
         let relative =
             |difference: Vec3, scale: f32| (difference * scale).clamp(Vec3::splat(-LARGEST), Vec3::splat(LARGEST));
         let own = relative(self.from_filtered, self.scale);
@@ -176,6 +185,7 @@ impl Difference {
             Some(noise) => (own, relative(noise, self.scale), 1.0),
             // With one sample the neighbour is the other half: its noise is independent, and the filter errs much as here.
             None => {
+                let neighbour = neighbour();
                 let beside = relative(neighbour.from_filtered, neighbour.scale);
                 (0.5 * (own + beside), 0.5 * (own - beside), 2.0)
             }
@@ -215,32 +225,71 @@ const BIAS: f64 = 4.0;
 /// Nested windows of 3, 9, 27 and 81 pixels a side.
 const LEVELS: usize = 4;
 
+/// Rows that are worked on at once: enough for many threads, and few next to those that the widest windows reach over.
+const ROWS: usize = 32;
+
+/// Windows of one size, of rows that are not done with.
+struct Level {
+    widening: Widening<Evidence>,
+    rows: VecDeque<Vec<Evidence>>,
+}
+
+impl Level {
+    /// Takes the next rows of the level below, and says how many of its own are known by that.
+    fn push<'r>(&mut self, rows: impl IndexedParallelIterator<Item = &'r Vec<Evidence>>) -> usize {
+        let fresh = self.widening.push(rows);
+        let count = fresh.len();
+        self.rows.extend(fresh);
+        count
+    }
+}
+
 /// The unfiltered value's share for each pixel.
 fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
-    let width = frame.width;
-    let differences: Vec<Difference> = (0..frame.pixels.len()).into_par_iter().map(&measure).collect();
+    let (width, count) = (frame.width, frame.pixels.len());
+    let height = count / width.max(1);
     let evidence = |i: usize| {
         let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
-        differences[i].evidence(&differences[neighbour])
+        measure(i).evidence(|| measure(neighbour))
     };
-    let mut levels = vec![widened(&(0..differences.len()).into_par_iter().map(evidence).collect::<Vec<_>>(), width, 1)];
-    drop(differences);
-    for level in 1..LEVELS {
-        levels.push(widened(&levels[level - 1], width, 3_usize.pow(level as u32)));
-    }
-    let doubt = f64::from(doubt);
-    let weight = |i: usize| {
-        let mut believed = 0.0;
-        for (level, windows) in levels.iter().enumerate().rev() {
-            let [error, standard_error] = windows[i].error(levels.get(level + 1).map(|wider| &wider[i]));
-            let doubt = if level == 0 { 1.5 * doubt } else { doubt };
-            believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
+    let mut levels: [Level; LEVELS] = std::array::from_fn(|level| Level {
+        widening: Widening::new(3_usize.pow(level as u32), height),
+        rows: VecDeque::new(),
+    });
+    let mut shares = Vec::with_capacity(count);
+    for begin in (0..height).step_by(ROWS) {
+        let rows = (begin..height.min(begin + ROWS)).into_par_iter();
+        let pixels: Vec<Vec<_>> = rows.map(|y| (y * width..(y + 1) * width).map(evidence).collect()).collect();
+        let mut fresh = levels[0].push(pixels.par_iter());
+        for level in 1..LEVELS {
+            let (narrower, wider) = levels.split_at_mut(level);
+            let rows = &narrower[level - 1].rows;
+            let rows: Vec<_> = rows.range(rows.len() - fresh..).collect();
+            fresh = wider[0].push(rows.into_par_iter());
         }
-        // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
-        let bias = BIAS * believed;
-        if bias > 0.0 { (bias / (bias + levels[1][i].noise())) as f32 } else { 0.0 }
-    };
-    (0..frame.pixels.len()).into_par_iter().map(weight).collect()
+        // The widest windows are known last, and of those that are only now.
+        let share = |y: usize| -> Vec<f32> {
+            let rows: [&[Evidence]; LEVELS] = std::array::from_fn(|level| levels[level].rows[y].as_slice());
+            (0..width).map(|x| share(rows.map(|row| &row[x]), f64::from(doubt))).collect()
+        };
+        let of_rows: Vec<Vec<f32>> = (0..fresh).into_par_iter().map(share).collect();
+        shares.extend(of_rows.into_iter().flatten());
+        levels.iter_mut().for_each(|level| drop(level.rows.drain(..fresh)));
+    }
+    shares
+}
+
+/// The unfiltered value's share for a pixel from its windows, from narrow to wide.
+fn share(windows: [&Evidence; LEVELS], doubt: f64) -> f32 {
+    let mut believed = 0.0;
+    for (level, window) in windows.iter().enumerate().rev() {
+        let [error, standard_error] = window.error(windows.get(level + 1).copied());
+        let doubt = if level == 0 { 1.5 * doubt } else { doubt };
+        believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
+    }
+    // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
+    let bias = BIAS * believed;
+    if bias > 0.0 { (bias / (bias + windows[1].noise())) as f32 } else { 0.0 }
 }
 
 /// What is believed of an error with an estimate, its standard error, and what is believed of the surroundings.

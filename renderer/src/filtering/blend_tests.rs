@@ -108,7 +108,7 @@ fn the_doubt_is_the_variance_of_the_error() {
             let from_filtered = Vec3::splat(0.5 * (a + b) - bias);
             Difference { from_filtered, noise: Some(Vec3::splat(0.5 * (a - b))), scale: 1.0 }
         };
-        let all: Vec<Evidence> = (0..n).map(|i| evidence(i).evidence(&evidence(i))).collect();
+        let all: Vec<Evidence> = (0..n).map(|i| evidence(i).evidence(|| evidence(i))).collect();
         let mean = |of: &dyn Fn(&Evidence) -> f64| all.iter().map(of).sum::<f64>() / n as f64;
         let error = mean(&|e| e.error.into());
         let variance = mean(&|e| (f64::from(e.error) - error).powi(2));

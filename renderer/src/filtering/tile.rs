@@ -2,7 +2,7 @@
 
 use filter::PathRecord;
 
-use crate::integrator::{Aside, Cut, Recorder, Unrecorded};
+use crate::integrator::{Aside, Cut, Ids, Recorder, Unrecorded};
 use crate::math::Rgb;
 
 /// Keeps what a path's recorder has seen.
@@ -26,8 +26,8 @@ pub struct Watching<'w, K> {
     pub keeper: K,
     /// How many groups of lights are told apart.
     pub groups: usize,
-    /// Ids of the names of objects and materials, by surface.
-    pub ids: &'w [[u32; 2]],
+    /// Ids of names, if they are wanted.
+    pub ids: Option<&'w Ids>,
 }
 
 impl<'w, K: Keeper> Keeper for Watching<'w, K> {

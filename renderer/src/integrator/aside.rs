@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::direct::{DirectLight, Vertex};
 use super::recorder::Recorder;
 use crate::bsdf::BsdfSample;
+use crate::interaction::SurfaceInteraction;
 use crate::light::Group;
 use crate::math::Rgb;
 
@@ -28,14 +29,34 @@ pub struct Feature {
     pub ns: Vec3,
 }
 
+/// Ids of the names of objects and materials.
+#[derive(Clone, Debug, Default)]
+pub struct Ids {
+    /// Of surfaces that are not instanced, by their indices, and then of each instance's.
+    pub surfaces: Vec<[u32; 2]>,
+    /// Where those of each instance begin.
+    pub instances: Vec<u32>,
+}
+
+impl Ids {
+    /// Those of the object and the material at a hit.
+    fn of(&self, surface: &SurfaceInteraction<'_>) -> [u32; 2] {
+        let at = match surface.instance() {
+            Some(number) => self.instances[number as usize] + surface.number_in_object(),
+            None => surface.geometry,
+        };
+        self.surfaces[at as usize]
+    }
+}
+
 /// A path's light taken apart, and its first rough surface.
 ///
 /// Reflection and refraction are drawn in proportion to what they carry, so that over many paths a pane shows what is
 /// behind it and what it mirrors as they are seen.
 #[derive(Clone, Debug, Default)]
 pub struct Aside<'w> {
-    /// Ids of the names of objects and materials, by surface; empty if nobody wants to know.
-    ids: &'w [[u32; 2]],
+    /// Ids of names, if anybody wants to know.
+    ids: Option<&'w Ids>,
     /// Those of the first hit.
     seen: Option<[u32; 2]>,
     /// Light of each class, by [`Scattered`].
@@ -53,9 +74,8 @@ pub struct Aside<'w> {
 }
 
 impl<'w> Aside<'w> {
-    /// A path that begins, with as many groups of lights to be told apart, and `ids` of the names of each surface's object and
-    /// material.
-    pub fn new(groups: usize, ids: &'w [[u32; 2]]) -> Self {
+    /// A path that begins, with as many groups of lights to be told apart.
+    pub fn new(groups: usize, ids: Option<&'w Ids>) -> Self {
         Self { ids, groups: vec![Rgb::ZERO; groups], beta: Rgb::ONE, squeezed: 1.0, worth: 1.0, ..Self::default() }
     }
 
@@ -95,7 +115,7 @@ impl<'w> Aside<'w> {
 impl Recorder for Aside<'_> {
     fn arrive(&mut self, vertex: &Vertex<'_>, _: f32) {
         if self.bounces == 0 {
-            self.seen = self.ids.get(vertex.surface.geometry as usize).copied();
+            self.seen = self.ids.map(|ids| ids.of(vertex.surface));
         }
         if self.feature.is_none() && !vertex.shading.bsdf.is_specular() {
             let albedo = vertex.shading.bsdf.albedo(vertex.wo) * self.beta * self.squeezed;

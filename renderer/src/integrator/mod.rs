@@ -8,7 +8,7 @@ mod record;
 mod recorder;
 mod roulette;
 
-pub use aside::{Aside, Feature, Scattered};
+pub use aside::{Aside, Feature, Ids, Scattered};
 pub use path::trace;
 pub use queries::{AlphaTested, Opaque, Queries, Recorded, Recording};
 pub use record::{FirstHit, Sample};

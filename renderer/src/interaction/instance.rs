@@ -10,6 +10,8 @@ use crate::math::gamma;
 pub struct Instance {
     /// Index of the object's first surface.
     pub first_surface: u32,
+    /// Its own index among the instances of its [`super::Geometry`].
+    pub(super) number: u32,
     /// The transform, as the ray query has it.
     world_from_object: Affine3A,
     /// Takes normals to world space: the transposed inverse of the linear part, rounded from f64.
@@ -26,6 +28,7 @@ impl Instance {
         let sound = world_from_object.is_finite() && inverse.as_mat3().is_finite();
         sound.then(|| Self {
             first_surface,
+            number: 0,
             world_from_object,
             normal_matrix: Mat3A::from(inverse.transpose().as_mat3()),
             inverse_error: inverse_error(m, inverse) as f32,

@@ -15,4 +15,4 @@ pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;
 pub use wiener::wiener;
-pub use window::{widened, windows};
+pub use window::{Widening, widened, windows};

@@ -7,9 +7,10 @@ use filter::{Branch, Params, Slots};
 use rayon::prelude::*;
 
 use super::header::Header;
+use super::section::Unread;
 use super::write::{Writer, failed};
-use super::{BATCH, Part, PartError, Written, batches};
-use crate::film::{Film, Tile, tile_slots};
+use super::{Part, PartError, Written, batches};
+use crate::film::{Film, Image, Tile, tile_slots};
 use crate::filtering::{self, Filtering, Merging};
 use crate::frame::{Accumulation, FrameDescription, Samples};
 use crate::integrator::Counters;
@@ -25,10 +26,10 @@ pub struct Parts {
     parts: Vec<Part>,
 }
 
-/// The frame that parts add up to.
+/// The image that parts of a filtered frame add up to.
 pub struct Merged {
-    /// All sums, and the filtered image.
-    pub film: Film,
+    /// The filtered image.
+    pub image: Image,
     /// The frame.
     pub description: FrameDescription,
     /// The samples of all parts.
@@ -36,7 +37,7 @@ pub struct Merged {
     /// Rays, and samples that were rejected.
     pub counters: Counters,
     /// What the filter did.
-    pub report: Option<filtering::Report>,
+    pub report: filtering::Report,
 }
 
 impl Parts {
@@ -64,33 +65,57 @@ impl Parts {
         Some(self.samples.missing(&self.description.asked)).filter(|missing| !missing.is_empty())
     }
 
-    /// Adds them up, tree by tree and then tile by tile: the sums of pixels and one tree's cells are all that is ever held.
+    /// Adds the parts of a filtered frame up to its image, tree by tree and then band by band: the cells of one tree, and
+    /// later what the pixels show, are all that is ever held.
     ///
     /// # Errors
     /// A part is not whole, or damaged.
+    ///
+    /// # Panics
+    /// If the frame is not filtered.
     pub fn develop(mut self) -> Result<Merged, PartError> {
-        let tiles = self.description.tile_count();
-        let surroundings = self.description.surroundings;
-        let params = self.description.filtering.adaptive(&surroundings);
-        let mut merging = Merging::new(&self.description.filtering, &surroundings, tiles, self.description.aovs);
-        for (params, merging) in params.iter().zip(&mut merging) {
-            for tree in 0..params.stored_trees() {
-                let mut branches = Vec::with_capacity(tiles);
-                for batch in batches(0..tiles) {
-                    branches.extend(self.branches(params, tree, &batch)?);
-                }
-                merging.add_tree(branches);
+        let description = self.description.clone();
+        let FrameDescription { filtering, surroundings, bounds, aovs, .. } = &description;
+        let merging = Merging::new(filtering, surroundings, *bounds, *aovs);
+        let (mut merging, params) = merging.zip(filtering.adaptive(surroundings)).expect("a filtered frame");
+        for tree in 0..params.stored_trees() {
+            for batch in self.batches(0..description.tile_count()) {
+                merging.add(self.branches(&params, tree, &batch)?);
+            }
+            merging.end_tree();
+        }
+        let mut image: Option<Image> = None;
+        let mut first = 0;
+        for band in description.bands() {
+            let mut film = description.band_film(band);
+            let slots = self.pixels(first, &mut film, |_, slots| slots)?;
+            merging.band(first, &slots, &mut film);
+            first += slots.len();
+            match &mut image {
+                Some(image) => image.append(film.image()),
+                None => image = Some(film.image().with_room_for(*bounds)),
             }
         }
-        let mut film = self.description.film();
-        let resolved = self.pixels(&mut film, |tile, slots| match &merging {
-            Some(merging) => merging.resolve(tile, &slots),
-            None => Vec::new(),
-        })?;
         self.end()?;
-        let report = merging.map(|merging| merging.finish(self.filter_paths, resolved, &surroundings, &mut film));
-        let Self { description, samples, counters, .. } = self;
-        Ok(Merged { film, description, samples, counters, report })
+        let mut image = image.expect("a frame has pixels");
+        let report = merging.finish(self.filter_paths, &mut image);
+        let Self { samples, counters, .. } = self;
+        Ok(Merged { image, description, samples, counters, report })
+    }
+
+    /// Adds the parts of a frame up to all its sums.
+    ///
+    /// # Errors
+    /// A part is not whole, or damaged.
+    pub fn sum(mut self) -> Result<Accumulation, PartError> {
+        if self.description.filtering != Filtering::None {
+            return self.accumulate(|_| ());
+        }
+        let mut frame = Accumulation::new(self.description.clone());
+        self.pixels(0, &mut frame.film, |_, _| ())?;
+        self.end()?;
+        (frame.samples, frame.counters) = (self.samples, self.counters);
+        Ok(frame)
     }
 
     /// Adds them up one after the other, for whom it matters what the frame is after each: all sums are held.
@@ -117,7 +142,7 @@ impl Parts {
         let params = self.description.filtering.adaptive(&self.description.surroundings);
         if let Some(params) = &params {
             for tree in 0..params.stored_trees() {
-                for batch in batches(0..tiles) {
+                for batch in self.batches(0..tiles) {
                     let branches = self.branches(params, tree, &batch)?;
                     let store = |tile: usize, words: &mut Vec<u64>| {
                         branches[tile - batch.start].store(&tile_slots(tile), words);
@@ -126,69 +151,83 @@ impl Parts {
                 }
             }
         }
-        let mut film = self.description.film();
-        let slots = self.pixels(&mut film, |_, slots| slots)?;
+        let mut first = 0;
+        for band in self.description.bands() {
+            let mut film = self.description.band_film(band);
+            let slots = self.pixels(first, &mut film, |_, slots| slots)?;
+            let store = |tile: usize, words: &mut Vec<u64>| {
+                let own = tile_slots(tile - first);
+                film.store(own.start as usize..own.end as usize, words);
+                if params.is_some() {
+                    slots[tile - first].store(&tile_slots(tile), words);
+                }
+            };
+            writer.sections(first..first + slots.len(), store).map_err(failed(path))?;
+            first += slots.len();
+        }
         self.end()?;
-        let store = |tile, words: &mut Vec<u64>| {
-            let pixels = tile_slots(tile);
-            film.store(pixels.start as usize..pixels.end as usize, words);
-            if params.is_some() {
-                slots[tile].store(&pixels, words);
-            }
-        };
-        writer.sections(0..tiles, store).and_then(|()| writer.end(&[])).map_err(failed(path))
+        writer.end(&[]).map_err(failed(path))
+    }
+
+    /// Tiles in batches of which the sections of all parts, ten kilobytes each, fit into a few megabytes.
+    fn batches(&self, tiles: Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
+        batches(tiles, (256 / self.parts.len()).clamp(1, 64))
     }
 
     /// The sums of a batch's shares of a tree.
     fn branches(&mut self, params: &Params, tree: usize, batch: &Range<usize>) -> Result<Vec<Branch>, PartError> {
-        let words = self.words(batch)?;
+        let unread = self.unread(batch)?;
         let sum = |tile: usize| {
-            let shares = self.parts.iter().zip(&words).map(|(part, words)| {
-                Branch::read(params, tree, &tile_slots(tile), &words[tile - batch.start])
-                    .map_err(|_| part.sections.damaged())
-            });
-            Ok(Branch::sum(shares.collect::<Result<_, _>>()?))
+            let share = |(part, unread): (&Part, &Vec<Unread>)| {
+                let words = unread[tile - batch.start].words();
+                let share = words.and_then(|words| Branch::read(params, tree, &tile_slots(tile), &words).ok());
+                share.ok_or_else(|| part.sections.damaged())
+            };
+            Ok(Branch::sum(self.parts.iter().zip(&unread).map(share).collect::<Result<_, _>>()?))
         };
         batch.clone().into_par_iter().map(sum).collect()
     }
 
-    /// Adds the pixels of all parts to a film; what `then` makes of each tile and what the filter keeps of its pixels.
+    /// Adds the pixels of all parts to a film whose first tile is the frame's tile `first`; what `then` makes of each tile and
+    /// of what the filter keeps of its pixels.
     fn pixels<T: Send>(
         &mut self,
+        first: usize,
         film: &mut Film,
         then: impl Fn(usize, Slots) -> T + Sync,
     ) -> Result<Vec<T>, PartError> {
         let filtered = self.description.filtering != Filtering::None;
         let mut done = Vec::with_capacity(film.tile_count());
         let mut tiles = film.tiles();
-        let mut begin = 0;
-        for tiles in tiles.chunks_mut(BATCH) {
-            let batch = begin..begin + tiles.len();
-            let words = self.words(&batch)?;
-            let add = |(at, pixels): (usize, &mut Tile<'_>)| {
-                let tile = batch.start + at;
+        for batch in self.batches(first..first + tiles.len()) {
+            let unread = self.unread(&batch)?;
+            let add = |(tile, pixels): (usize, &mut Tile<'_>)| {
                 let mut sum = Slots::default();
-                for (part, words) in self.parts.iter().zip(&words) {
-                    let mut rest = words[at].as_slice();
-                    let slots = pixels.load(&mut rest).and_then(|()| match filtered {
-                        true => Slots::read(&tile_slots(tile), rest).ok(),
-                        false => rest.is_empty().then(Slots::default),
+                for (part, unread) in self.parts.iter().zip(&unread) {
+                    let words = unread[tile - batch.start].words();
+                    let slots = words.and_then(|words| {
+                        let mut rest = words.as_slice();
+                        pixels.load(&mut rest)?;
+                        match filtered {
+                            true => Slots::read(&tile_slots(tile), rest).ok(),
+                            false => rest.is_empty().then(Slots::default),
+                        }
                     });
                     sum.add(slots.ok_or_else(|| part.sections.damaged())?);
                 }
                 Ok(then(tile, sum))
             };
-            let of_batch: Result<Vec<T>, PartError> = tiles.par_iter_mut().enumerate().map(add).collect();
+            let tiles = &mut tiles[batch.start - first..batch.end - first];
+            let of_batch: Result<Vec<T>, PartError> = batch.clone().into_par_iter().zip(tiles).map(add).collect();
             done.extend(of_batch?);
-            begin = batch.end;
         }
         Ok(done)
     }
 
-    /// The words of the next sections, a batch's, of every part.
-    fn words(&mut self, batch: &Range<usize>) -> Result<Vec<Vec<Vec<u64>>>, PartError> {
-        let words = |part: &mut Part| batch.clone().map(|_| part.sections.words()).collect();
-        self.parts.par_iter_mut().map(words).collect()
+    /// The next sections, a batch's, of every part.
+    fn unread(&mut self, batch: &Range<usize>) -> Result<Vec<Vec<Unread>>, PartError> {
+        let unread = |part: &mut Part| batch.clone().map(|_| part.sections.unread()).collect();
+        self.parts.iter_mut().map(unread).collect()
     }
 
     /// Makes sure that all files end where they should.

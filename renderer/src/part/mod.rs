@@ -130,11 +130,8 @@ pub fn storable(filtering: &Filtering) -> Result<(), PartError> {
     }
 }
 
-/// Tiles that are read or written at once: enough for many threads, at about a tenth of a megabyte each.
-const BATCH: usize = 64;
-
-/// Tiles in batches.
-fn batches(tiles: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+/// Tiles in batches of so many.
+fn batches(tiles: Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> {
     let end = tiles.end;
-    tiles.step_by(BATCH).map(move |first| first..(first + BATCH).min(end))
+    tiles.step_by(length).map(move |first| first..(first + length).min(end))
 }

@@ -13,18 +13,20 @@ use super::PartError;
 /// Bytes before those of a section.
 const PREFIX: usize = 12;
 
-/// A section of any bytes.
-pub fn of_bytes(bytes: &[u8]) -> Vec<u8> {
-    let mut section = vec![0; PREFIX];
-    section.extend(bytes);
-    seal(&mut section);
-    section
+/// Appends a section of any bytes.
+pub fn append_bytes(file: &mut Vec<u8>, bytes: &[u8]) {
+    let begin = file.len();
+    file.resize(begin + PREFIX, 0);
+    file.extend(bytes);
+    seal(&mut file[begin..]);
 }
 
-/// A section of words.
-pub fn of_words(words: &[u64]) -> Vec<u8> {
+/// Appends a section of words.
+pub fn append_words(file: &mut Vec<u8>, words: &[u64]) {
+    let begin = file.len();
     // Room for all, and for eight bytes from wherever a word begins.
-    let mut section = vec![0; PREFIX + 8 + words.len().div_ceil(2) + 8 * words.len() + 8];
+    file.resize(begin + PREFIX + 8 + words.len().div_ceil(2) + 8 * words.len() + 8, 0);
+    let section = &mut file[begin..];
     section[PREFIX..PREFIX + 8].copy_from_slice(&(words.len() as u64).to_le_bytes());
     let mut end = PREFIX + 8;
     for pair in words.chunks(2) {
@@ -37,9 +39,8 @@ pub fn of_words(words: &[u64]) -> Vec<u8> {
             end += length;
         }
     }
-    section.truncate(end);
-    seal(&mut section);
-    section
+    file.truncate(begin + end);
+    seal(&mut file[begin..]);
 }
 
 fn seal(section: &mut [u8]) {
@@ -109,14 +110,14 @@ impl Sections {
 
     /// The bytes of the next section.
     pub fn bytes(&mut self) -> Result<Vec<u8>, PartError> {
-        let mut bytes = self.padded()?;
-        bytes.truncate(bytes.len() - PADDING);
-        Ok(bytes)
+        let Unread { mut padded, checksum } = self.unread()?;
+        padded.truncate(padded.len() - PADDING);
+        if crc32fast::hash(&padded) == checksum { Ok(padded) } else { Err(self.damaged()) }
     }
 
     /// The words of the next section.
     pub fn words(&mut self) -> Result<Vec<u64>, PartError> {
-        words(&self.padded()?).ok_or_else(|| self.damaged())
+        self.unread()?.words().ok_or_else(|| self.damaged())
     }
 
     /// What is said where checksums do not tell, but sense does.
@@ -124,8 +125,8 @@ impl Sections {
         PartError::Damaged(self.path.clone())
     }
 
-    /// The bytes of the next section, checked, and zeros behind them.
-    fn padded(&mut self) -> Result<Vec<u8>, PartError> {
+    /// The next section as it is in the file.
+    pub fn unread(&mut self) -> Result<Unread, PartError> {
         let mut prefix = [0; PREFIX];
         self.read(&mut prefix)?;
         let [length @ .., c0, c1, c2, c3] = prefix;
@@ -133,13 +134,9 @@ impl Sections {
         if length > self.rest {
             return Err(PartError::Truncated(self.path.clone()));
         }
-        let mut bytes = vec![0; length as usize + PADDING];
-        let own = &mut bytes[..length as usize];
-        self.read(own)?;
-        if crc32fast::hash(own) != u32::from_le_bytes([c0, c1, c2, c3]) {
-            return Err(self.damaged());
-        }
-        Ok(bytes)
+        let mut padded = vec![0; length as usize + PADDING];
+        self.read(&mut padded[..length as usize])?;
+        Ok(Unread { padded, checksum: u32::from_le_bytes([c0, c1, c2, c3]) })
     }
 
     fn read(&mut self, bytes: &mut [u8]) -> Result<(), PartError> {
@@ -152,9 +149,32 @@ impl Sections {
     }
 }
 
+/// A section of which nobody has looked at the bytes yet: several threads may, of one file.
+pub struct Unread {
+    /// The bytes, and [`PADDING`] zeros.
+    padded: Vec<u8>,
+    checksum: u32,
+}
+
+impl Unread {
+    /// The words; `None` where the bytes are not those that were written.
+    pub fn words(&self) -> Option<Vec<u64>> {
+        let whole = crc32fast::hash(&self.padded[..self.padded.len() - PADDING]) == self.checksum;
+        whole.then(|| words(&self.padded)).flatten()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn of_words(words: &[u64]) -> Vec<u8> {
+        // What stands before it is left alone.
+        let mut file = vec![7; 5];
+        append_words(&mut file, words);
+        assert_eq!(file[..5], [7; 5]);
+        file.split_off(5)
+    }
 
     fn read(section: &[u8]) -> Option<Vec<u64>> {
         words(&[&section[PREFIX..], &[0; PADDING]].concat())

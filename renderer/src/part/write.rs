@@ -1,7 +1,7 @@
 //! Writing parts.
 
-use std::fs::OpenOptions;
-use std::io::{self, BufWriter, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
 use std::ops::Range;
 use std::path::Path;
 
@@ -78,54 +78,67 @@ pub fn failed(path: &Path) -> impl Fn(io::Error) -> PartError {
 /// A part that is being written.
 pub struct Writer {
     draft: Draft,
-    file: BufWriter<std::fs::File>,
+    file: File,
     bytes: u64,
+    /// Room for sections, to be used again: asking the system for it takes as long as filling it.
+    room: Vec<Vec<u8>>,
 }
+
+/// Tiles of which a thread writes the sections into one piece of memory.
+const GROUP: usize = 4;
+
+/// Groups that are made while as many are on their way to the file: enough for many threads, at a tenth of a megabyte each.
+const GROUPS: usize = 32;
 
 impl Writer {
     /// Writes all that comes before the sums.
     pub fn begin(path: &Path, header: &Header) -> io::Result<Self> {
         let draft = Draft::create(path)?;
-        let file = BufWriter::with_capacity(1 << 20, OpenOptions::new().write(true).open(draft.path())?);
-        let mut writer = Self { draft, file, bytes: 0 };
-        writer.put(&MAGIC)?;
-        writer.put(&section::of_bytes(&serde_json::to_vec(header).map_err(io::Error::other)?))?;
+        let file = OpenOptions::new().write(true).open(draft.path())?;
+        let mut writer = Self { draft, file, bytes: 0, room: Vec::new() };
+        let mut first = MAGIC.to_vec();
+        section::append_bytes(&mut first, &serde_json::to_vec(header).map_err(io::Error::other)?);
+        writer.put(&[first])?;
         Ok(writer)
     }
 
     /// Writes a section for each of some tiles: what `store` appends.
     pub fn sections(&mut self, tiles: Range<usize>, store: impl Fn(usize, &mut Vec<u64>) + Sync) -> io::Result<()> {
-        let encode = |batch: Range<usize>| -> Vec<Vec<u8>> {
-            let of_tile = |words: &mut Vec<u64>, tile| {
+        let encode = |words: &mut Vec<u64>, (bytes, tiles): (&mut Vec<u8>, Range<usize>)| {
+            bytes.clear();
+            for tile in tiles {
                 words.clear();
                 store(tile, words);
-                section::of_words(words)
-            };
-            batch.into_par_iter().map_init(Vec::new, of_tile).collect()
+                section::append_words(bytes, words);
+            }
         };
-        // A batch goes to the disk while the next one is made.
-        let mut done: Vec<Vec<u8>> = Vec::new();
-        for batch in batches(tiles) {
-            let (next, written) = rayon::join(|| encode(batch), || self.put_all(&done));
-            written?;
-            done = next;
+        // Some groups go to the disk while the next ones are made.
+        let (mut next, mut done) = (std::mem::take(&mut self.room), Vec::new());
+        for batch in batches(tiles, GROUPS * GROUP) {
+            let groups: Vec<Range<usize>> = batches(batch, GROUP).collect();
+            next.resize_with(groups.len(), Vec::new);
+            let made = || next.par_iter_mut().zip(groups).for_each_init(Vec::new, encode);
+            rayon::join(made, || self.put(&done)).1?;
+            std::mem::swap(&mut next, &mut done);
         }
-        self.put_all(&done)
+        self.put(&done)?;
+        self.room = done;
+        Ok(())
     }
 
     /// Writes the last section.
     pub fn end(mut self, epoch: &[u64]) -> io::Result<Written> {
-        self.put(&section::of_words(epoch))?;
-        self.file.flush()?;
+        let mut last = Vec::new();
+        section::append_words(&mut last, epoch);
+        self.put(&[last])?;
         Ok(Written { draft: self.draft, bytes: self.bytes })
     }
 
-    fn put_all(&mut self, sections: &[Vec<u8>]) -> io::Result<()> {
-        sections.iter().try_for_each(|section| self.put(section))
-    }
-
-    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.bytes += bytes.len() as u64;
-        self.file.write_all(bytes)
+    fn put(&mut self, pieces: &[Vec<u8>]) -> io::Result<()> {
+        for bytes in pieces {
+            self.bytes += bytes.len() as u64;
+            self.file.write_all(bytes)?;
+        }
+        Ok(())
     }
 }

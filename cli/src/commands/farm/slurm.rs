@@ -18,7 +18,7 @@ pub fn write(arguments: &SlurmArguments, log: &Log) -> Result<(), Failure> {
     let folder = absolute(&arguments.folder)?;
     let failure = |why| Failure::Output(format!("cannot make the folder \"{}\": {why}", folder.display()));
     let sequence = Sequence::new(&arguments.sequence)?;
-    let scripts = Scripts::of(&sequence, &folder)?;
+    let scripts = Scripts::of(&sequence, &folder, arguments.retries)?;
     fs::create_dir_all(&folder).map_err(failure)?;
     for (name, text) in [("render.sbatch", scripts.render), ("merge.sbatch", scripts.merge), ("submit", scripts.submit)]
     {
@@ -41,7 +41,7 @@ struct Scripts {
 
 impl Scripts {
     /// Every path is absolute: Slurm runs copies of the scripts, elsewhere.
-    fn of(sequence: &Sequence<'_>, folder: &Path) -> Result<Self, Failure> {
+    fn of(sequence: &Sequence<'_>, folder: &Path, retries: u32) -> Result<Self, Failure> {
         let scene = absolute(&sequence.arguments.scene)?;
         let output = absolute(&sequence.arguments.output)?;
         let (scene, output, folder) = (plain(&scene)?, plain(&output)?, plain(folder)?);
@@ -49,10 +49,13 @@ impl Scripts {
         Ok(Self {
             render: render(sequence, scene, folder),
             merge: merge(sequence, output, folder),
-            submit: submit(sequence, images, folder),
+            submit: submit(sequence, images, folder, retries),
         })
     }
 }
+
+/// How often a task may be put back into the queue: beyond any night's preemptions, but not for ever.
+const MOST_RESTARTS: u32 = 50;
 
 /// One slice of one frame. The program takes the place of the shell, so that it is it whom Slurm's signals reach.
 fn render(sequence: &Sequence<'_>, scene: &str, folder: &str) -> String {
@@ -74,8 +77,13 @@ fn render(sequence: &Sequence<'_>, scene: &str, folder: &str) -> String {
 #SBATCH --requeue
 #SBATCH --signal=B:TERM@{NOTICE_SECONDS}
 {cpus}# One slice of frame $1; the array's index is the slice. A task that is told to stop stores what it has and exits with 75,
-# upon which a cluster with RequeueExit=75 in its slurm.conf runs it again; it then goes on where it was.
+# upon which a cluster with RequeueExit=75 in its slurm.conf runs it again; it then goes on where it was. Who is told to stop
+# so often gets nowhere.
 set -eu
+if [ \"${{SLURM_RESTART_COUNT:-0}}\" -gt {MOST_RESTARTS} ]; then
+    echo \"put back into the queue {MOST_RESTARTS} times: given up\" >&2
+    exit 1
+fi
 scene={scene}
 parts={parts}
 exec {program} {words}
@@ -115,15 +123,18 @@ exec {program} {words}
 }
 
 /// Hands all frames to Slurm. A frame is a job of its own, so that one that fails keeps no other from its merge.
-fn submit(sequence: &Sequence<'_>, images: &str, folder: &str) -> String {
+///
+/// Each try waits for the failure of all tries before it, not of the last one alone: one that Slurm drops, because there was
+/// nothing to try again, counts as failed too.
+fn submit(sequence: &Sequence<'_>, images: &str, folder: &str, retries: u32) -> String {
     let frames: Vec<_> = sequence.arguments.frames.numbers().iter().map(i32::to_string).collect();
     format!(
         "\
 #!/bin/bash
-# Hands the frames to Slurm: each an array of slices, the same array once more if a slice fails, and a merge that waits for
-# either. What is done is skipped and what was begun is gone on with, so a second try costs what the first one lost; where
-# there is nothing to try again, Slurm drops it. Arguments are given to sbatch. Run again, it renders only what is missing;
-# FRAMES=\"3 7\" names frames other than all.
+# Hands the frames to Slurm: each an array of slices, the same array again, up to {retries} times, while slices fail, and a merge
+# that waits for a try without failures. What is done is skipped and what was begun is gone on with, so a try costs what the
+# ones before it lost; what there is no need to try, Slurm drops. Arguments are given to sbatch. Run again, it renders only
+# what is missing; FRAMES=\"3 7\" names frames other than all, RETRIES=N tries more often or less.
 set -euo pipefail
 folder={folder}
 mkdir -p -- \"$folder/logs\" \"$folder/parts\" {images}
@@ -133,10 +144,14 @@ hand_over() {{
     echo \"${{job%%;*}}\"
 }}
 for frame in ${{FRAMES:-{frames}}}; do
-    first=$(hand_over --array=0-{last} \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
-    again=$(hand_over --array=0-{last} --dependency=\"afternotok:$first\" \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
-    merge=$(hand_over --dependency=\"afterok:$first?afterok:$again\" \"$@\" -- \"$folder/merge.sbatch\" \"$frame\")
-    echo \"frame $frame: slices are job $first, and $again if one fails; the merge is job $merge\"
+    tries=$(hand_over --array=0-{last} \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
+    failed=afternotok:$tries done=afterok:$tries
+    for ((retry = 0; retry < ${{RETRIES:-{retries}}}; retry++)); do
+        again=$(hand_over --array=0-{last} --dependency=\"$failed\" \"$@\" -- \"$folder/render.sbatch\" \"$frame\")
+        tries+=\" $again\" failed+=,afternotok:$again done+=?afterok:$again
+    done
+    merge=$(hand_over --dependency=\"$done\" \"$@\" -- \"$folder/merge.sbatch\" \"$frame\")
+    echo \"frame $frame: slices are job ${{tries/ /, and while some fail }}; the merge is job $merge\"
 done
 ",
         folder = quoted(folder),
@@ -165,7 +180,8 @@ mod tests {
 
     fn scripts(words: &[&str], folder: &Path) -> Scripts {
         let FarmEngine::Slurm(arguments) = parsed(words).engine else { panic!("not slurm") };
-        Scripts::of(&Sequence::new(&arguments.sequence).ok().unwrap(), folder).ok().unwrap()
+        let sequence = Sequence::new(&arguments.sequence).ok().unwrap();
+        Scripts::of(&sequence, folder, arguments.retries).ok().unwrap()
     }
 
     const LINE: [&str; 10] =
@@ -234,6 +250,14 @@ mod tests {
             String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect::<Vec<_>>()
         };
         let rendered = run(&scripts.render);
+        let restarted = |count: &str| {
+            let path = folder.path().join("script");
+            fs::write(&path, &scripts.render).unwrap();
+            let mut bash = Command::new("bash");
+            bash.arg(&path).arg("7").env("SLURM_ARRAY_TASK_ID", "1").env("SLURM_RESTART_COUNT", count);
+            bash.output().unwrap().status.code()
+        };
+        assert_eq!(["1", "50", "51"].map(restarted), [Some(0), Some(0), Some(1)]);
         let part = format!("{job}/parts/c_d.####.s1of2.part");
         assert_eq!(rendered[..8], ["render", &scene, "-o", &part, "--frames", "7", "--slice", "1/2"]);
         let merged = run(&scripts.merge);
@@ -252,15 +276,16 @@ mod tests {
         fs::set_permissions(bin.join("sbatch"), fs::Permissions::from_mode(0o755)).unwrap();
         let job = folder.path().join("the job");
         let (job, output) = (job.to_str().unwrap(), folder.path().join("x y/####.exr"));
-        let words =
-            ["slurm", "/s.pbrt", "-o", output.to_str().unwrap(), "--frames", "5", "--slices", "2", "--folder", job];
+        let output_name = output.to_str().unwrap();
+        let words = ["slurm", "/s.pbrt", "-o", output_name, "--frames", "5", "--slices", "2", "--folder", job];
+        let words = [&words[..], &["--retries", "2"]].concat();
         let script = folder.path().join("submit");
         fs::write(&script, scripts(&words, Path::new(job)).submit).unwrap();
         let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap());
         let ran = Command::new("bash").arg(&script).arg("--time=1").env("PATH", path).output().unwrap();
         assert_eq!(
             String::from_utf8(ran.stdout).unwrap(),
-            "frame 5: slices are job 41, and 42 if one fails; the merge is job 43\n"
+            "frame 5: slices are job 41, and while some fail 42 43; the merge is job 44\n"
         );
         let always = format!("<--parsable><--chdir={job}><--kill-on-invalid-dep=yes>");
         assert_eq!(
@@ -268,7 +293,8 @@ mod tests {
             format!(
                 "{always}<--array=0-1><--time=1><--><{job}/render.sbatch><5>\n\
                  {always}<--array=0-1><--dependency=afternotok:41><--time=1><--><{job}/render.sbatch><5>\n\
-                 {always}<--dependency=afterok:41?afterok:42><--time=1><--><{job}/merge.sbatch><5>\n"
+                 {always}<--array=0-1><--dependency=afternotok:41,afternotok:42><--time=1><--><{job}/render.sbatch><5>\n\
+                 {always}<--dependency=afterok:41?afterok:42?afterok:43><--time=1><--><{job}/merge.sbatch><5>\n"
             )
         );
         assert!(output.parent().unwrap().is_dir() && Path::new(job).join("logs").is_dir());

@@ -86,6 +86,8 @@ fn render(
     let encoding = job::encoding(&arguments.channels.encoding);
     let output = OutputFile::prepare(&path)?;
     let stats_file = arguments.channels.stats.as_deref().map(|path| OutputFile::prepare(&named(path))).transpose()?;
+    let checkpoint = checkpoint.as_deref().map(OutputFile::prepare).transpose()?;
+    apart(&output, checkpoint.as_ref(), stats_file.as_ref())?;
     let checkpoints = Checkpoints::new(&arguments.checkpoint, checkpoint, log)?;
 
     let job = job(arguments, filtering);
@@ -164,10 +166,25 @@ fn write_image(
     }
     let mut frame = pool.install(|| traced.develop());
     let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
-    let attributes = metadata::of_frame(&frame, error.as_ref(), provenance);
+    let provenance = provenance.then_some(&frame.statistics);
+    let attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
     let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     Ok(Written { frame, losses, error })
+}
+
+/// Makes sure that no file is written over another of the same frame.
+fn apart(output: &OutputFile, checkpoint: Option<&OutputFile>, statistics: Option<&OutputFile>) -> Result<(), Failure> {
+    let files = [(Some(output), "--output"), (checkpoint, "--checkpoint"), (statistics, "--stats")];
+    for (one, (file, option)) in files.iter().enumerate() {
+        for (other, other_option) in &files[one + 1..] {
+            if let Some((file, _)) = file.zip(*other).filter(|(file, other)| file.is(other)) {
+                let path = file.target().display();
+                return Err(Failure::Usage(format!("{option} and {other_option} are both \"{path}\": name two files")));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Whether there is an image or a part of this very frame that lacks no sample of those that are asked for.
