@@ -41,7 +41,7 @@ impl Default for Params {
             second_trees: 1,
             leaf: 4.0,
             second_leaf: 1.0,
-            shrinkage: Shrinkage { tau: 2.0, trusted: 24.0, levels: 4 },
+            shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 4 },
             epoch: 0,
             unit: 1.0,
         }

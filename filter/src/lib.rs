@@ -60,6 +60,7 @@
 #![forbid(unsafe_code)]
 
 pub mod adaptive;
+mod belief;
 mod buckets;
 mod first;
 mod grid;
@@ -77,6 +78,7 @@ mod table;
 pub mod talk;
 
 pub use adaptive::{Adaptive, Params, Report, Resolved};
+pub use belief::most_probable;
 pub use grid::Anchor;
 pub use packed::{PackedFootprint, PackedNormal, PackedRgb};
 pub use record::{Lobe, PathRecord, Vertex, direction_bin};

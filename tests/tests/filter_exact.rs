@@ -13,7 +13,7 @@ fn bare() -> Params {
         trees: 1,
         second_trees: 1,
         leaf: 1.0,
-        shrinkage: Shrinkage { tau: 0.0, levels: 0, ..Params::default().shrinkage },
+        shrinkage: Shrinkage { certain: f64::NEG_INFINITY, levels: 0, ..Params::default().shrinkage },
         ..Params::default()
     }
 }

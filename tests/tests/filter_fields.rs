@@ -65,8 +65,9 @@ fn mixed(x: f64) -> f64 {
 fn slabs_of_one_surface_leak_no_more_than_the_statistics_say() {
     // Nothing in a key tells parallel slabs of one mesh apart but their places. Where no border of a tree's finest cells
     // lies between them they share a cell, which a share 1 − t/h of the trees and places does. Where one does they are
-    // siblings, and of the difference a share τ (k−1) V / S is not believed: with V = 10⁸/2 within, S = n (10⁴/2)² and k = 8
-    // that is 14 τ / n, at two levels for some cells hold both sheets and others do not. Half of either is the leak.
+    // siblings, and of the difference a share 1/(1 + b)² is not believed, with b at least S/N less what chance makes of it:
+    // 2.8 in the default for k = 8. With V = 10⁸/2 within and S = n (10⁴/2)², S/N is n/14; at two levels, for some cells
+    // hold both sheets and others do not. Half of either is the leak.
     let params = Params::default();
     for spp in [4, 16, 64] {
         for thickness in THICKNESSES {
@@ -84,8 +85,8 @@ fn slabs_of_one_surface_leak_no_more_than_the_statistics_say() {
             let side = 2.0 * t.max(leaves(&params)[0]);
             let n = f64::from(2.0 * side * side * spp as f32);
             // 0.1: the places are 8 of all, and small groups measure their noise by all their scatter.
-            let bound =
-                mixed(0.5 * mean(&shared) + params.shrinkage.tau * 14.0 / n + 0.1 * f64::from(thickness <= 1.0));
+            let unbelieved = (1.0 + (n / 14.0 - 2.8).max(0.0)).powi(-2);
+            let bound = mixed(0.5 * mean(&shared) + unbelieved + 0.1 * f64::from(thickness <= 1.0));
             // Where nearly all share a cell there is nothing to ask.
             let bound = if bound < 0.9 { bound } else { f64::INFINITY };
             println!(

@@ -37,8 +37,8 @@ fn a_good_filter_is_left_alone() {
     for sigma in [1e-3, 0.1, 1.0] {
         for halves in [true, false] {
             let gain = 0.5 * sigma * sigma / error(&frame(sigma, halves, |_, _| 0.0));
-            // Of a filter without error: what chance speaks against it costs a hundredth of the noise at most.
-            assert!(gain > 100.0, "{sigma} {halves}: {gain}");
+            // Of a filter without error: what chance speaks against it costs 1/300 of the noise at most.
+            assert!(gain > 300.0, "{sigma} {halves}: {gain}");
         }
     }
 }
@@ -117,24 +117,5 @@ fn the_doubt_is_the_variance_of_the_error() {
         assert!((doubt / variance - 1.0).abs() < tolerance, "{bias}: {doubt} {variance}");
         let expected = 3.0 * f64::from(bias).powi(2);
         assert!((error - expected).abs() < 3.0 * (variance / n as f64).sqrt(), "{bias}: {error} {expected}");
-    }
-}
-
-#[test]
-fn what_is_believed_lies_between_the_estimate_and_the_surroundings() {
-    assert!((most_probable(2.0, 1e-6, 0.5) - 2.0).abs() < 1e-6);
-    assert!((most_probable(2.0, 1e6, 0.5) - 0.5).abs() < 1e-6);
-    assert_eq!(most_probable(2.0, 0.0, 0.5), 2.0);
-    assert_eq!(most_probable(-2.0, 0.0, 0.5), 0.0);
-    assert_eq!(most_probable(2.0, 1.0, 0.0), 0.0);
-    for error in [-3.0, 0.0, 0.4, 0.5, 7.0] {
-        let mut last = 0.0;
-        for around in [1e-30, 1e-3, 0.1, 1.0, 1e3, 1e30] {
-            let found = most_probable(error, 0.7, around);
-            // The peak of the density there: neither side is more probable.
-            let density = |b: f64| b.ln() - b / around - 0.5 * ((b - error) / 0.7).powi(2);
-            assert!(found > last && density(found) >= density(found * 1.01) && density(found) >= density(found * 0.99));
-            last = found;
-        }
     }
 }

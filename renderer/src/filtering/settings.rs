@@ -134,7 +134,8 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
             value.map(|value| all.params.epoch = value).is_some()
         },
     },
-    number!("tau", params.shrinkage.tau: f64, 0, 1000),
+    number!("certain", params.shrinkage.certain: f64, 0, 1000),
+    number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
     number!("levels", params.shrinkage.levels: u32, 0, 16),
     number!("doubt", blend.doubt: f32, 0, 1000),
@@ -439,7 +440,7 @@ mod tests {
     fn settings_are_set_and_read_back() {
         let cases = [
             ("adaptive", "trees", "8", "9"),
-            ("adaptive", "tau", "3.25", "-0.1"),
+            ("adaptive", "certain", "3.25", "-0.1"),
             ("adaptive", "levels", "0", "1.5"),
             ("adaptive", "leaf", "0.5", "0"),
             ("adaptive", "second_leaf", "auto", "-1"),
