@@ -37,11 +37,11 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
-            trees: 4,
+            trees: 3,
             second_trees: 1,
             leaf: 4.0,
             second_leaf: 1.0,
-            shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 4 },
+            shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 5 },
             epoch: 0,
             unit: 1.0,
         }

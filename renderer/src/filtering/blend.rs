@@ -12,7 +12,7 @@
 //! error s are weighed by [`most_probable`] against what is believed of the window around it, or the lower confidence bound
 //! e − c s is believed if that is more: at first nothing is believed, so only what is certain speaks against the filter.
 //! With b what is believed of the narrowest window the result is F + w (U − F), w = κb / (κb + V). With κ = 1 and the true
-//! b that minimises the squared error of the sum of independent estimates; [`BIAS`] says why and where κ is
+//! b that minimises the squared error of the sum of independent estimates; [`GRAVITY`] says why and where κ is
 //! more. As samples grow V and s vanish, and w goes to 1 wherever F is wrong.
 //!
 //! With one sample a pixel there are no halves; then the neighbouring pixel stands for the other half.
@@ -212,14 +212,13 @@ impl Evidence {
     }
 }
 
-/// κ, what the filter's error counts over noise as far as it is believed of [`BROAD`] windows: a bias is what more samples
-/// around do not average out. Over noise it buys a bias that falls to less than half of the error. Of narrow windows' it is
-/// 1: they are often wrong where light is rare, and more would make dots of noise. Measured on six scenes at 4 to 64 samples,
-/// the squared errors change by −2 to +1 % against κ = 1.
-const BIAS: f64 = 4.0;
+/// κ − 1 where noise cannot be seen. A bias is what more samples around do not average out, so it counts more than noise;
+/// this much buys a bias that falls to less than half of the error. Where noise can be seen κ is 1: there it would make dots
+/// of it.
+const GRAVITY: f64 = 4.0;
 
-/// Level of the windows that are broad: of 27 pixels a side.
-const BROAD: usize = 2;
+/// Squared noise that can be seen, relative to brightness, as the sum over channels: of a tenth in each.
+const SEEN: f64 = 3.0 * 0.1 * 0.1;
 
 /// Nested windows of 3, 9, 27 and 81 pixels a side.
 const LEVELS: usize = 4;
@@ -280,18 +279,16 @@ fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sy
 
 /// The unfiltered value's share for a pixel from its windows, from narrow to wide.
 fn share(windows: [&Evidence; LEVELS], doubt: f64) -> f32 {
-    let (mut believed, mut broad) = (0.0, 0.0);
+    let mut believed = 0.0;
     for (level, window) in windows.iter().enumerate().rev() {
         let [error, standard_error] = window.error(windows.get(level + 1).copied());
         let doubt = if level == 0 { 1.5 * doubt } else { doubt };
         believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
-        if level == BROAD {
-            broad = believed;
-        }
     }
     // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
-    let bias = believed + (BIAS - 1.0) * broad.min(believed);
-    if bias > 0.0 { (bias / (bias + windows[1].noise())) as f32 } else { 0.0 }
+    let noise = windows[1].noise();
+    let bias = believed * (1.0 + GRAVITY * SEEN / (SEEN + noise));
+    if bias > 0.0 { (bias / (bias + noise)) as f32 } else { 0.0 }
 }
 
 #[cfg(test)]
