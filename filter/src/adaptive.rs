@@ -37,7 +37,7 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
-            trees: 3,
+            trees: 4,
             second_trees: 1,
             leaf: 4.0,
             second_leaf: 1.0,
