@@ -79,12 +79,6 @@ impl Folder {
                 Err(error @ (RenderError::Scene(_) | RenderError::Compile(_))) => {
                     let messages = describe(&error);
                     let placed = messages.lines().skip(1).any(|line| line.contains("scene.pbrt:"));
-                    if std::env::var("WHY").is_ok() {
-                        println!(
-                            "WHY {}",
-                            messages.lines().skip(1).filter(|l| l.contains("error")).next().unwrap_or("?")
-                        );
-                    }
                     return if placed { Ok(Outcome::Refused) } else { Err(Wrong(messages)) };
                 }
                 Err(error) => return Err(Wrong(describe(&error))),
