@@ -56,6 +56,26 @@ pub fn distinct(output: &Path, frames: &[i32]) -> Result<(), Failure> {
     }
 }
 
+/// Makes sure that every frame has a scene, before the first is rendered.
+///
+/// # Errors
+/// The scenes that are missing.
+pub fn check_scenes(scene: &Path, frames: &[i32]) -> Result<(), Failure> {
+    let scenes = frames.iter().map(|&frame| named(scene, frame));
+    let missing: Vec<PathBuf> = scenes.filter(|scene| !scene.exists()).collect();
+    match &*missing {
+        [] => Ok(()),
+        [first] => Err(Failure::Input(format!("there is no scene \"{}\": nothing was rendered", first.display()))),
+        [first, .., last] => Err(Failure::Input(format!(
+            "{} of {} scenes are missing, from \"{}\" to \"{}\": nothing was rendered",
+            missing.len(),
+            frames.len(),
+            first.display(),
+            last.display()
+        ))),
+    }
+}
+
 /// Makes sure that a name ends as the kind of file that will be written.
 ///
 /// # Errors

@@ -49,7 +49,7 @@ fn stored(filter: &mut Adaptive) -> Vec<Vec<Vec<u64>>> {
     filter.settle();
     let part = |part| {
         let mut words = vec![Vec::new(); TREES + 1];
-        (0..TREES).for_each(|tree| filter.store_tree(tree, part, &slots(part), &mut words[tree]));
+        filter.store_trees(part, &slots(part), &mut words[..TREES]);
         filter.store_slots(part, &slots(part), &mut words[TREES]);
         words
     };
@@ -109,12 +109,23 @@ fn an_epoch_can_be_gone_on_with() {
     for (part, words) in stored(&mut first).iter().enumerate() {
         load(&mut second, part, words).unwrap();
     }
+    second.begin_stored_epoch(3);
     let mut words = Vec::new();
-    first.store_epoch(&mut words);
-    second.load_epoch(3, &words).unwrap();
+    for piece in first.epoch() {
+        words.clear();
+        first.store_epoch(&piece, &mut words);
+        second.add_epoch(&words).unwrap();
+    }
     add(&mut second, 3..8);
     assert_eq!(second.resolve(), whole.resolve());
-    assert_eq!(filter().load_epoch(3, &words[1..]), Err(StoredError));
+    // Not a tree; not so many cells; not a key; more than the cells.
+    for (at, value) in [(0, 1), (1, words[1] + 1), (1, words[1] - 1), (3, u64::MAX)] {
+        let mut wrong = words.clone();
+        wrong[at] = value;
+        assert_eq!(filter().add_epoch(&wrong), Err(StoredError), "word {at} is {value}");
+    }
+    assert_eq!(filter().add_epoch(&words[..words.len() - 1]), Err(StoredError));
+    assert_eq!(filter().add_epoch(&[]), Err(StoredError));
 }
 
 #[test]

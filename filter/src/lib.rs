@@ -83,4 +83,4 @@ pub use grid::Anchor;
 pub use packed::{PackedFootprint, PackedNormal, PackedRgb};
 pub use record::{Lobe, PathRecord, Vertex, direction_bin};
 pub use shrink::Shrinkage;
-pub use stored::{Branch, Merging, Slots, StoredError};
+pub use stored::{Branch, EpochPiece, Merging, Slots, StoredError};

@@ -230,7 +230,9 @@ impl Pairs {
 
     /// Orders the pairs of blocks that have ended.
     pub fn settle(&mut self) {
-        self.compact();
+        if self.compact < self.pairs.len() {
+            self.compact();
+        }
     }
 
     /// All pairs by slot and cell, after [`Self::settle`].

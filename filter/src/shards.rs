@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::buckets::Buckets;
 use crate::grid::{CellKey, LeafCell};
-use crate::sums::Deposit;
+use crate::sums::{Deposit, WideSums};
 use crate::table::Table;
 
 /// Shards by the upper bits of the hash, each behind a lock that is held for a batch.
@@ -60,6 +60,19 @@ impl ShardedTable {
     /// The shards while nobody adds to them.
     pub fn tables(&self) -> Vec<MutexGuard<'_, Table<CellKey>>> {
         self.shards.iter().map(|shard| shard.lock().unwrap_or_else(PoisonError::into_inner)).collect()
+    }
+
+    /// A shard while nobody adds to it.
+    pub fn table(&self, shard: usize) -> MutexGuard<'_, Table<CellKey>> {
+        self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds sums to a cell.
+    pub fn merge(&self, key: CellKey, sums: &WideSums) {
+        let hash = key.hash();
+        let mut table = self.table((hash >> (64 - SHARD_BITS)) as usize);
+        let number = table.cell_of_hash(key, hash as u32);
+        table.merge(number, sums);
     }
 
     /// Forgets all cells, and keeps the memory.

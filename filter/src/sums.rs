@@ -183,7 +183,7 @@ impl CellSums for PlainSums {
     }
 
     fn merge(&mut self, sums: &WideSums) -> bool {
-        let plain = sums.count.checked_mul(PLAIN_WEIGHT.into()) == Some(sums.weight);
+        let plain = WideSums::plain_weight(sums.count) == Some(sums.weight);
         let count = u32::try_from(sums.count).ok().filter(|_| plain);
         let Some((count, [_, _, words @ ..])) = count.zip(sums.words()) else { return false };
         self.add_words(words, count)
@@ -219,7 +219,14 @@ impl WideSums {
         self.merge(&Self { count: 1, weight: deposit.weight.into(), rgb, square });
     }
 
+    /// The weight of so many deposits of weight 1; `None` for more than there can be.
+    #[inline]
+    pub fn plain_weight(count: u64) -> Option<u64> {
+        count.checked_mul(PLAIN_WEIGHT.into())
+    }
+
     /// Count, weight, radiance and square if all are below 2⁶³.
+    #[inline]
     pub fn words(&self) -> Option<[u64; 6]> {
         let [r, g, b] = self.rgb;
         let words = [self.count.into(), self.weight.into(), r, g, b, self.square];

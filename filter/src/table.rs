@@ -184,6 +184,11 @@ impl<K: Key> Table<K> {
         self.cells().map(|cell| cell.key.cell_key())
     }
 
+    /// Number of cells.
+    pub fn len(&self) -> u32 {
+        self.len as u32
+    }
+
     /// Key of a cell.
     pub fn key(&self, cell: u32) -> CellKey {
         self.at(cell).key.cell_key()

@@ -10,7 +10,7 @@ mod tile;
 use std::ops::Range;
 
 use filter::talk::{self, Talk};
-use filter::{Adaptive, Anchor, Branch, PathRecord, Resolved, Slots, StoredError};
+use filter::{Adaptive, Anchor, Branch, EpochPiece, PathRecord, Resolved, Slots, StoredError};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
@@ -205,17 +205,17 @@ impl FrameFilter {
         }
     }
 
-    /// Makes ready for [`Self::store_tree`].
+    /// Makes ready for [`Self::store_trees`].
     pub fn settle(&mut self) {
         if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
             adaptive.settle();
         }
     }
 
-    /// Appends the share that a tile with these pixels has of a tree.
-    pub fn store_tree(&self, tree: usize, tile: usize, pixels: &Range<u32>, words: &mut Vec<u64>) {
+    /// Appends the share that a tile with these pixels has of each tree to the words of that tree.
+    pub fn store_trees(&self, tile: usize, pixels: &Range<u32>, words: &mut [Vec<u64>]) {
         if let Sharing::Adaptive(adaptive, _) = &self.sharing {
-            adaptive.store_tree(tree, tile, pixels, words);
+            adaptive.store_trees(tile, pixels, words);
         }
     }
 
@@ -226,7 +226,7 @@ impl FrameFilter {
         }
     }
 
-    /// Adds what [`Self::store_tree`] appended.
+    /// Adds what [`Self::store_trees`] appended for a tree.
     ///
     /// # Errors
     /// There are no such sums.
@@ -257,23 +257,37 @@ impl FrameFilter {
         }
     }
 
-    /// Appends what samples share with those after `next`, the next one; nothing between epochs.
-    pub fn store_epoch(&self, next: u64, words: &mut Vec<u64>) {
-        if let Sharing::Adaptive(adaptive, _) = &self.sharing {
-            if next % self.blocks.epoch != 0 {
-                adaptive.store_epoch(words);
-            }
+    /// What samples share with those to come, of which `next` is the first, in pieces that may be stored at once; nothing
+    /// between epochs.
+    pub fn epoch(&self, next: u64) -> Vec<EpochPiece> {
+        match &self.sharing {
+            Sharing::Adaptive(adaptive, _) if next % self.blocks.epoch != 0 => adaptive.epoch(),
+            _ => Vec::new(),
         }
     }
 
-    /// Goes on with what [`Self::store_epoch`] appended.
+    /// Appends a piece of [`Self::epoch`].
+    pub fn store_epoch(&self, piece: &EpochPiece, words: &mut Vec<u64>) {
+        if let Sharing::Adaptive(adaptive, _) = &self.sharing {
+            adaptive.store_epoch(piece, words);
+        }
+    }
+
+    /// Makes ready for [`Self::load_epoch`], which then adds what is known of the epoch of `next`, the next sample.
+    pub fn begin_stored_epoch(&mut self, next: u64) {
+        if let Sharing::Adaptive(adaptive, _) = &mut self.sharing {
+            adaptive.begin_stored_epoch(next);
+        }
+    }
+
+    /// Adds what [`Self::store_epoch`] appended.
     ///
     /// # Errors
     /// As for [`Self::load_tree`].
-    pub fn load_epoch(&mut self, next: u64, words: &[u64]) -> Result<(), StoredError> {
+    pub fn load_epoch(&mut self, words: &[u64]) -> Result<(), StoredError> {
         match &mut self.sharing {
-            Sharing::Adaptive(adaptive, _) if !words.is_empty() => adaptive.load_epoch(next, words),
-            _ => Ok(()),
+            Sharing::Adaptive(adaptive, _) => adaptive.add_epoch(words),
+            Sharing::Talk(..) => Err(StoredError),
         }
     }
 

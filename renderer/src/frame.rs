@@ -225,21 +225,25 @@ impl Accumulation {
             .flatten()
             .expect("the settings of a frame's filter are valid");
         filter.settle();
+        let mut trees = vec![Vec::new(); filter.stored_trees()];
         let mut words = Vec::new();
         for tile in 0..film.tile_count() {
             let pixels = film::tile_slots(tile);
-            for tree in 0..filter.stored_trees() {
-                words.clear();
-                filter.store_tree(tree, tile, &pixels, &mut words);
-                copy.load_tree(tree, tile, &pixels, &words).expect("a filter takes its own sums");
+            trees.iter_mut().for_each(Vec::clear);
+            filter.store_trees(tile, &pixels, &mut trees);
+            for (tree, words) in trees.iter().enumerate() {
+                copy.load_tree(tree, tile, &pixels, words).expect("a filter takes its own sums");
             }
             words.clear();
             filter.store_slots(tile, &pixels, &mut words);
             copy.load_slots(tile, &pixels, &words).expect("a filter takes its own sums");
         }
-        words.clear();
-        filter.store_epoch(samples.start, &mut words);
-        copy.load_epoch(samples.start, &words).expect("a filter takes its own sums");
+        copy.begin_stored_epoch(samples.start);
+        for piece in filter.epoch(samples.start) {
+            words.clear();
+            filter.store_epoch(&piece, &mut words);
+            copy.load_epoch(&words).expect("a filter takes its own sums");
+        }
         copy.add(samples, records);
         copy.finish(&description.surroundings, film);
     }

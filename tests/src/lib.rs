@@ -7,4 +7,5 @@ pub mod image;
 pub mod render;
 pub mod shared;
 pub mod small;
+pub mod strange;
 pub mod synthetic;

@@ -285,7 +285,7 @@ fn parts_of_a_frame_add_to_the_same_bits_in_any_order() {
         filter.settle();
         let mut words = vec![Vec::new(); params.stored_trees() + 1];
         let (own, trees) = words.split_last_mut().expect("the slots' words");
-        trees.iter_mut().enumerate().for_each(|(tree, words)| filter.store_tree(tree, 0, &slots, words));
+        filter.store_trees(0, &slots, trees);
         filter.store_slots(0, &slots, own);
         words
     };

@@ -178,6 +178,63 @@ fn a_render_goes_on_from_its_checkpoint_to_the_same_bytes() {
     assert!(run.stderr.contains("none"), "{}", run.stderr);
 }
 
+/// The last epoch may be shorter than the others: it is over with the frame.
+#[test]
+fn frames_of_any_number_of_samples_merge() {
+    let bench = bench();
+    for spp in ["9", "6"] {
+        bench.succeed(&["render", "scene.pbrt", "--spp", spp, "-o", "whole.exr"]);
+        for slice in ["0", "1"] {
+            let (name, slice) = (format!("{slice}.part"), format!("{slice}/2"));
+            bench.succeed(&["render", "scene.pbrt", "--spp", spp, "-o", &name, "--slice", &slice]);
+        }
+        bench.succeed(&["merge", "1.part", "0.part", "-o", "merged.exr"]);
+        assert!(bytes(&bench, "merged.exr") == bytes(&bench, "whole.exr"), "{spp} samples");
+    }
+}
+
+/// Within an epoch, and with no checkpoint due before the time was over.
+#[test]
+fn what_a_limit_of_time_ends_can_be_gone_on_with() {
+    let bench = bench();
+    let job = ["render", "scene.pbrt", "--spp", "2048", "--aov", "all", "--progress", "none"];
+    let kept = ["--checkpoint", "a.checkpoint", "-o", "a.exr"];
+    let run = bench.succeed(&[&job[..], &kept, &["--time-limit", "0.000001s"]].concat());
+    assert!(run.stderr.contains("64 of 2048") && run.stderr.contains("goes on from the checkpoint"), "{}", run.stderr);
+    let run = bench.succeed(&[&job[..], &kept, &["--resume", "require"]].concat());
+    assert!(run.stderr.contains("samples 0:64 are there"), "{}", run.stderr);
+    assert!(!bench.files().contains(&"a.checkpoint".into()));
+    bench.succeed(&[&job[..], &["-o", "whole.exr"]].concat());
+    assert!(bytes(&bench, "a.exr") == bytes(&bench, "whole.exr"));
+}
+
+/// A limit on the size of files stands for a full disk: the system refuses bytes in the middle of a file.
+#[test]
+fn what_cannot_be_written_is_said_and_loses_nothing() {
+    let bench = bench();
+    let run = |options: &str| {
+        let program = env!("CARGO_BIN_EXE_tessera");
+        let job = "render scene.pbrt --spp 8 --resolution 320x200 --filter none --progress none";
+        let script = format!("trap '' XFSZ; ulimit -f 64; exec {program} {job} {options}");
+        let output =
+            std::process::Command::new("sh").args(["-c", &script]).current_dir(bench.path("")).output().unwrap();
+        super::Run::of(output)
+    };
+    bench.write("a.exr", "what was there");
+    bench.write("a.part", "what was there");
+    for (name, options) in [("a.exr", "-o a.exr --compression none"), ("a.part", "-o a.part")] {
+        let run = run(options);
+        assert_eq!(run.code, 4, "{}", run.stderr);
+        assert!(run.stderr.contains(&format!("{name}: File too large")), "{}", run.stderr);
+    }
+    assert!(bytes(&bench, "a.exr") == b"what was there" && bytes(&bench, "a.part") == b"what was there");
+    // The checkpoint does not fit, the compressed image of a smaller frame does.
+    let run = run("-o b.exr --pixel-bounds 0,64,0,64 --checkpoint b.checkpoint --checkpoint-interval 1p");
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(run.stderr.contains("no checkpoint") && run.stderr.contains("the render goes on"), "{}", run.stderr);
+    assert_eq!(bench.files(), ["a.exr", "a.part", "b.exr", "scene.pbrt"]);
+}
+
 #[test]
 fn a_checkpoint_of_something_else_is_not_gone_on_with() {
     let bench = bench();

@@ -64,6 +64,15 @@ fn frames_without_names_of_their_own_are_refused() {
 }
 
 #[test]
+fn a_missing_scene_is_found_before_the_first_frame_is_rendered() {
+    let bench = bench();
+    let render = ["render", "shot.####.pbrt", "-o", "a.####.exr", "--frames"];
+    bench.fail(&[&render[..], &["1-3"]].concat(), 3, &["shot.0003.pbrt", "nothing was rendered"]);
+    bench.fail(&[&render[..], &["1-9x2"]].concat(), 3, &["4 of 5", "shot.0003.pbrt", "shot.0009.pbrt"]);
+    assert_eq!(bench.files(), ["shot.0001.pbrt", "shot.0002.pbrt"]);
+}
+
+#[test]
 fn what_is_there_is_skipped_only_if_it_is_what_was_asked_for() {
     let bench = bench();
     for name in ["a.exr", "a.part"] {

@@ -13,7 +13,7 @@ use crate::sums::WideSums;
 /// | words | what |
 /// |---|---|
 /// | 1 | number of cells |
-/// | 8, or 12 if it is wide | of each, by rising key: step from the last key, low and high; 2 × deposits, + 1 if wide; Σ weight; Σ weight · radiance; Σ weight · luminance². A wide cell's last four sums have two words each, low and high |
+/// | 7 to 12 | of each, by rising key: step from the last key, low and high; 4 × deposits, + 1 if weighted, + 2 if wide; Σ weight if weighted, which else is 2¹⁶ each; Σ weight · radiance; Σ weight · luminance². A wide cell's last four sums have two words each, low and high |
 /// | 1 | number of pairs |
 /// | 5 | of each, by slot and cell: step from the last slot, or at first from that of the part; step from the slot's last cell, or at first from 0; throughput |
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub struct Branch {
 }
 
 impl Branch {
-    /// Reads what [`crate::Adaptive::store_tree`] or [`Self::store`] appended for a part with these slots.
+    /// Reads what [`crate::Adaptive::store_trees`] or [`Self::store`] appended for a part with these slots.
     ///
     /// # Errors
     /// There is no such share of a tree.
@@ -83,7 +83,7 @@ impl Branch {
         Self { cells, pairs }
     }
 
-    /// Appends the share, of a part with these slots, as [`crate::Adaptive::store_tree`] does.
+    /// Appends the share, of a part with these slots, as [`crate::Adaptive::store_trees`] does.
     pub fn store(&self, slots: &Range<u32>, words: &mut Vec<u64>) {
         store_cells(self.cells.iter().copied(), words);
         store_pairs(&self.pairs, slots, words);
@@ -92,25 +92,37 @@ impl Branch {
 
 /// Appends cells, which come by key.
 pub(super) fn store_cells(cells: impl ExactSizeIterator<Item = (CellKey, WideSums)>, words: &mut Vec<u64>) {
+    words.reserve(8 * cells.len());
     words.push(cells.len() as u64);
     let mut last = 0;
     for (key, sums) in cells {
         words.extend(split(key.bits() - last));
         last = key.bits();
-        // Whatever fits into 63 bits, as nearly all does, need not be split.
-        match sums.words() {
-            Some([count, rest @ ..]) => words.extend([count << 1].into_iter().chain(rest)),
-            None => {
-                let WideSums { count, weight, rgb: [r, g, b], square } = sums;
-                words.extend([count.min(u64::MAX >> 1) << 1 | 1, weight]);
-                words.extend([r, g, b, square].into_iter().flat_map(split));
-            }
+        store_sums(&sums, words);
+    }
+}
+
+/// Appends the sums of a cell.
+#[inline]
+pub(super) fn store_sums(sums: &WideSums, words: &mut Vec<u64>) {
+    let weighted = WideSums::plain_weight(sums.count) != Some(sums.weight);
+    let count = sums.count.min(u64::MAX >> 2) << 2 | u64::from(weighted);
+    // Whatever fits into 63 bits, as nearly all does, need not be split.
+    match sums.words() {
+        Some([_, _, r, g, b, square]) if !weighted => words.extend_from_slice(&[count, r, g, b, square]),
+        Some([_, weight, r, g, b, square]) => words.extend_from_slice(&[count, weight, r, g, b, square]),
+        None => {
+            words.push(count | 2);
+            words.extend(weighted.then_some(sums.weight));
+            let [r, g, b] = sums.rgb;
+            words.extend([r, g, b, sums.square].into_iter().flat_map(split));
         }
     }
 }
 
 /// Appends pairs, which come by slot and cell.
 pub(super) fn store_pairs(pairs: &[Pair], slots: &Range<u32>, words: &mut Vec<u64>) {
+    words.reserve(1 + 5 * pairs.len());
     words.push(pairs.len() as u64);
     let (mut slot, mut cell) = (slots.start, 0);
     for pair in pairs {
@@ -119,7 +131,7 @@ pub(super) fn store_pairs(pairs: &[Pair], slots: &Range<u32>, words: &mut Vec<u6
             (slot, cell) = (pair.slot(), 0);
         }
         let [r, g, b] = pair.throughput().map(|x| i64::from(x) as u64);
-        words.extend([slot_step.into(), (pair.index() - cell) as u64, r, g, b]);
+        words.extend_from_slice(&[slot_step.into(), (pair.index() - cell) as u64, r, g, b]);
         cell = pair.index();
     }
 }

@@ -20,7 +20,9 @@ pub use merging::Merging;
 pub use slots::Slots;
 
 use crate::adaptive::{Adaptive, Params};
+use crate::buckets::Buckets;
 use crate::grid::CellKey;
+use crate::pairs::Pair;
 use crate::sums::WideSums;
 use crate::table::{Key, Table};
 
@@ -49,28 +51,38 @@ impl Adaptive {
         self.params.stored_trees()
     }
 
-    /// Orders what the last blocks have left, as [`Self::store_tree`] wants it.
+    /// Orders what the last blocks have left, as [`Self::store_trees`] wants it.
     pub fn settle(&mut self) {
         self.parts.par_iter_mut().for_each(|part| part.pairs.settle());
     }
 
-    /// Appends a part's share of a tree, after [`Self::settle`]. The part has `slots`.
+    /// Appends a part's share of each tree to the words of that tree, after [`Self::settle`]: of all at once, because the
+    /// pairs of all trees lie together. The part has `slots`.
     ///
     /// # Panics
-    /// If there is no such part, or no such tree.
-    pub fn store_tree(&self, tree: usize, part: usize, slots: &Range<u32>, words: &mut Vec<u64>) {
+    /// If there is no such part, or there are not as many lists as [`Self::stored_trees`].
+    pub fn store_trees(&self, part: usize, slots: &Range<u32>, words: &mut [Vec<u64>]) {
+        assert_eq!(words.len(), self.stored_trees(), "lists of words");
         let part = &self.parts[part];
-        let trees = part.cells[0].len();
-        let numbers = store_cells(&part.cells[tree / trees][tree % trees], words);
-        let of_tree = part.pairs.settled().iter().filter(|pair| pair.tree_of(2 * trees) == tree);
-        let mut pairs: Vec<_> = of_tree.map(|pair| pair.with_cell(numbers[pair.index()])).collect();
-        for same in pairs.chunk_by_mut(|a, b| a.slot() == b.slot()) {
-            same.sort_unstable_by_key(|pair| pair.index());
+        let (settled, trees) = (part.pairs.settled(), words.len());
+        let by_tree = Buckets::new(trees, settled.iter().map(|pair| pair.tree_of(trees) as u32));
+        let (mut order, mut pairs) = (Order::default(), Vec::with_capacity(settled.len()));
+        for (tree, (table, words)) in part.cells.iter().flatten().zip(words).enumerate() {
+            order.store_cells(table, words);
+            let renumbered = |at: &u32| {
+                let pair = settled[*at as usize];
+                pair.with_cell(order.numbers[pair.index()])
+            };
+            pairs.clear();
+            pairs.extend(by_tree.get(tree).iter().map(renumbered));
+            for same in pairs.chunk_by_mut(|a: &Pair, b: &Pair| a.slot() == b.slot()) {
+                same.sort_unstable_by_key(|pair| pair.index());
+            }
+            branch::store_pairs(&pairs, slots, words);
         }
-        branch::store_pairs(&pairs, slots, words);
     }
 
-    /// Adds what [`Self::store_tree`] appended for this part of another filter over the same frame.
+    /// Adds what [`Self::store_trees`] appended for this part of another filter over the same frame.
     ///
     /// # Panics
     /// If there is no such part, or no such tree.
@@ -88,7 +100,7 @@ impl Adaptive {
         self.cells_changed();
     }
 
-    /// Reads what [`Self::store_tree`] appended for this part of another filter, and adds it.
+    /// Reads what [`Self::store_trees`] appended for this part of another filter, and adds it.
     ///
     /// # Errors
     /// There is no such share of a tree.
@@ -122,29 +134,57 @@ impl Adaptive {
         self.parts[part].pairs.absorb_own(&slots.0);
     }
 
-    /// Appends what second vertices share so far in the current epoch.
-    pub fn store_epoch(&self, words: &mut Vec<u64>) {
-        for tree in &self.second {
-            tree.cells.tables().iter().for_each(|table| {
-                store_cells(table, words);
-            });
+    /// What second vertices share so far in the current epoch, in pieces that may be stored at once.
+    pub fn epoch(&self) -> Vec<EpochPiece> {
+        let pieces = self.second.iter().enumerate().flat_map(|(tree, second)| {
+            second
+                .cells
+                .tables()
+                .iter()
+                .enumerate()
+                .flat_map(|(shard, table)| pieces(tree, shard, table.len()))
+                .collect::<Vec<_>>()
+        });
+        pieces.collect()
+    }
+
+    /// Appends one of [`Self::epoch`]. The order of its cells is that in which they were met: nothing depends on it.
+    ///
+    /// | words | what |
+    /// |---|---|
+    /// | 1 | tree |
+    /// | 1 | number of cells |
+    /// | 7 to 12 | of each: key, low and high; sums as in [`Branch`] |
+    ///
+    /// # Panics
+    /// If paths were added since.
+    pub fn store_epoch(&self, piece: &EpochPiece, words: &mut Vec<u64>) {
+        let EpochPiece { tree, shard, cells } = piece;
+        let table = self.second[*tree].cells.table(*shard);
+        words.extend([*tree as u64, cells.len() as u64]);
+        for cell in cells.clone() {
+            words.extend(split(table.key(cell).bits()));
+            branch::store_sums(&table.sums(cell), words);
         }
     }
 
-    /// Goes on in the epoch of `next`, the next sample of the slots, with what [`Self::store_epoch`] appended.
+    /// Goes on in the epoch of `next`, the next sample of the slots, to which [`Self::add_epoch`] adds what is known of it.
+    pub fn begin_stored_epoch(&mut self, next: u64) {
+        self.begin_block(next);
+    }
+
+    /// Adds what [`Self::store_epoch`] appended.
     ///
     /// # Errors
     /// There are no such sums; some of them may have been added.
-    pub fn load_epoch(&mut self, next: u64, words: &[u64]) -> Result<(), StoredError> {
-        self.begin_block(next);
+    pub fn add_epoch(&mut self, words: &[u64]) -> Result<(), StoredError> {
         let mut words = Words(words);
-        for tree in &self.second {
-            for mut table in tree.cells.tables() {
-                for (key, sums) in load_cells(&mut words)? {
-                    let cell = table.cell(key);
-                    table.merge(cell, &sums);
-                }
-            }
+        let [tree] = words.take()?;
+        let tree = usize::try_from(tree).ok().and_then(|tree| self.second.get(tree)).ok_or(StoredError)?;
+        for _ in 0..words.count(7)? {
+            let [low, high] = words.take()?;
+            let key = CellKey::from_bits(join(low, high)).ok_or(StoredError)?;
+            tree.cells.merge(key, &load_sums(&mut words)?);
         }
         words.end()
     }
@@ -161,38 +201,72 @@ impl Adaptive {
     }
 }
 
-/// Appends a table's cells by key; their numbers in that order, by their numbers in the table.
-fn store_cells<K: Key>(table: &Table<K>, words: &mut Vec<u64>) -> Vec<u32> {
-    let mut order: Vec<(CellKey, u32)> = table.keys().zip(0..).collect();
-    order.sort_unstable_by_key(|(key, _)| *key);
-    let mut numbers = vec![0; order.len()];
-    for ((_, cell), number) in order.iter().zip(0..) {
-        numbers[*cell as usize] = number;
-    }
-    branch::store_cells(order.into_iter().map(|(key, cell)| (key, table.sums(cell))), words);
-    numbers
+/// A piece of what second vertices share in an epoch: some cells of a table.
+#[derive(Clone, Debug)]
+pub struct EpochPiece {
+    tree: usize,
+    shard: usize,
+    cells: Range<u32>,
 }
 
-/// Reads what [`store_cells`] appended: by key, each once.
+/// Cells of a piece: half a megabyte of words.
+const PIECE: u32 = 1 << 13;
+
+fn pieces(tree: usize, shard: usize, cells: u32) -> impl Iterator<Item = EpochPiece> {
+    let piece = move |first: u32| EpochPiece { tree, shard, cells: first..cells.min(first.saturating_add(PIECE)) };
+    (0..cells).step_by(PIECE as usize).map(piece)
+}
+
+/// The cells of a table by key.
+#[derive(Default)]
+struct Order {
+    cells: Vec<(CellKey, u32)>,
+    /// Their numbers in that order, by their numbers in the table.
+    numbers: Vec<u32>,
+}
+
+impl Order {
+    /// Appends a table's cells by key.
+    fn store_cells<K: Key>(&mut self, table: &Table<K>, words: &mut Vec<u64>) {
+        self.cells.clear();
+        self.cells.extend(table.keys().zip(0..));
+        self.cells.sort_unstable_by_key(|(key, _)| *key);
+        self.numbers.resize(self.cells.len(), 0);
+        for ((_, cell), number) in self.cells.iter().zip(0..) {
+            self.numbers[*cell as usize] = number;
+        }
+        branch::store_cells(self.cells.iter().map(|(key, cell)| (*key, table.sums(*cell))), words);
+    }
+}
+
+/// Reads what [`branch::store_cells`] appended: by key, each once.
 fn load_cells(words: &mut Words<'_>) -> Result<Vec<(CellKey, WideSums)>, StoredError> {
-    let count = words.count(8)?;
+    let count = words.count(7)?;
     let mut cells = Vec::with_capacity(count);
     let mut last = 0;
     for _ in 0..count {
-        let [low, high, count, weight] = words.take()?;
-        let [r, g, b, square] = if count & 1 == 0 {
-            words.take::<4>()?.map(u128::from)
-        } else {
-            let halves = words.take::<8>()?;
-            std::array::from_fn(|i| join(halves[2 * i], halves[2 * i + 1]))
-        };
+        let [low, high] = words.take()?;
         // No cell has only zeros for its key, so a step of 0 is never right.
         let step = Some(join(low, high)).filter(|step| *step > 0).ok_or(StoredError)?;
         last = step.checked_add(last).ok_or(StoredError)?;
         let key = CellKey::from_bits(last).ok_or(StoredError)?;
-        cells.push((key, WideSums { count: count >> 1, weight, rgb: [r, g, b], square }));
+        cells.push((key, load_sums(words)?));
     }
     Ok(cells)
+}
+
+/// Reads what [`branch::store_sums`] appended.
+fn load_sums(words: &mut Words<'_>) -> Result<WideSums, StoredError> {
+    let [count] = words.take()?;
+    let (weighted, wide, count) = (count & 1 != 0, count & 2 != 0, count >> 2);
+    let weight = if weighted { words.take::<1>()?[0] } else { WideSums::plain_weight(count).ok_or(StoredError)? };
+    let [r, g, b, square] = if wide {
+        let halves = words.take::<8>()?;
+        std::array::from_fn(|i| join(halves[2 * i], halves[2 * i + 1]))
+    } else {
+        words.take::<4>()?.map(u128::from)
+    };
+    Ok(WideSums { count, weight, rgb: [r, g, b], square })
 }
 
 fn split(x: u128) -> [u64; 2] {
@@ -232,7 +306,7 @@ mod tests {
     #[test]
     fn a_cell_comes_once() {
         const KEY: u64 = 0x4c4c_4c4c_4c4c_4c4c;
-        let sums = [2, 1, 0, 0, 0, 0];
+        let sums = [5, 1, 0, 0, 0, 0];
         let cells = |steps: &[[u64; 2]]| {
             let cells = steps.iter().flat_map(|step| [&step[..], &sums].concat());
             load_cells(&mut Words(&[steps.len() as u64].into_iter().chain(cells).collect::<Vec<_>>()))

@@ -1,6 +1,7 @@
 //! A film as an EXR file.
 
-use std::io;
+use std::fs::OpenOptions;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use oiio::{Attribute, Channel, Compression, FileFormat, Format, Output, Window};
@@ -128,9 +129,20 @@ pub fn write_image(
         attributes,
         compression: encoding.compression,
     };
-    let written = oiio::write(&output).map_err(|why| WriteError::Image { path: path.to_owned(), why })?;
+    let written = oiio::write(&output).map_err(|why| match refusal(&draft) {
+        Some(why) => file_error(why),
+        None => WriteError::Image { path: path.to_owned(), why },
+    })?;
     draft.publish().map_err(file_error)?;
     Ok(Losses { clamped_negative: image.clamped_negative, clamped_half: written.clamped })
+}
+
+/// Why the system takes no more bytes of a file, if it does not. OpenEXR only says that it could not write.
+fn refusal(draft: &Draft) -> Option<io::Error> {
+    // More than a disk that has refused a block of pixels has left.
+    const MORE: usize = 1 << 20;
+    let mut file = OpenOptions::new().append(true).open(draft.path()).ok()?;
+    file.write_all(&vec![0; MORE]).and_then(|()| file.sync_all()).err()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::header::Header;
 use super::section::Unread;
 use super::write::{Writer, failed};
-use super::{Part, PartError, Written, batches};
+use super::{Part, PartError, Written, batch_length, batches, runs};
 use crate::film::{Film, Image, Tile, tile_slots};
 use crate::filtering::{self, Filtering, Merging};
 use crate::frame::{Accumulation, FrameDescription, Samples};
@@ -79,8 +79,8 @@ impl Parts {
         let merging = Merging::new(filtering, surroundings, *bounds, *aovs);
         let (mut merging, params) = merging.zip(filtering.adaptive(surroundings)).expect("a filtered frame");
         for tree in 0..params.stored_trees() {
-            for batch in self.batches(0..description.tile_count()) {
-                merging.add(self.branches(&params, tree, &batch)?);
+            for piece in self.pieces(0..description.tile_count()) {
+                merging.add(self.branches(&params, tree, &piece)?);
             }
             merging.end_tree();
         }
@@ -125,7 +125,8 @@ impl Parts {
     pub fn accumulate(self, mut then: impl FnMut(&mut Accumulation)) -> Result<Accumulation, PartError> {
         let mut frame = Accumulation::new(self.description);
         for mut part in self.parts {
-            part.add_to(&mut frame)?;
+            let pieces = part.add_to(&mut frame)?;
+            part.end(pieces)?;
             then(&mut frame);
         }
         Ok(frame)
@@ -138,54 +139,55 @@ impl Parts {
     pub fn write(mut self, path: &Path) -> Result<Written, PartError> {
         let header = Header::new(&self.description, &self.samples, &self.counters, self.filter_paths);
         let mut writer = Writer::begin(path, &header).map_err(failed(path))?;
-        let tiles = self.description.tile_count();
-        let params = self.description.filtering.adaptive(&self.description.surroundings);
-        if let Some(params) = &params {
-            for tree in 0..params.stored_trees() {
-                for batch in self.batches(0..tiles) {
-                    let branches = self.branches(params, tree, &batch)?;
-                    let store = |tile: usize, words: &mut Vec<u64>| {
-                        branches[tile - batch.start].store(&tile_slots(tile), words);
-                    };
-                    writer.sections(batch.clone(), store).map_err(failed(path))?;
+        let description = self.description.clone();
+        let params = description.filtering.adaptive(&description.surroundings);
+        let mut first = 0;
+        for band in description.bands() {
+            let mut film = description.band_film(band);
+            let tiles = first..first + film.tile_count();
+            // Of each tree, tile by tile.
+            let mut trees: Vec<Vec<Branch>> = Vec::new();
+            if let Some(params) = &params {
+                for tree in 0..params.stored_trees() {
+                    let pieces = self.pieces(tiles.clone()).map(|piece| self.branches(params, tree, &piece));
+                    trees.push(pieces.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect());
                 }
             }
-        }
-        let mut first = 0;
-        for band in self.description.bands() {
-            let mut film = self.description.band_film(band);
             let slots = self.pixels(first, &mut film, |_, slots| slots)?;
-            let store = |tile: usize, words: &mut Vec<u64>| {
-                let own = tile_slots(tile - first);
+            let store = |tile: usize, runs: &mut [Vec<u64>]| {
+                let (words, of_trees) = runs.split_last_mut().expect("the run of the pixels");
+                let (pixels, own) = (tile_slots(tile), tile_slots(tile - first));
+                of_trees.iter_mut().zip(&trees).for_each(|(words, tree)| tree[tile - first].store(&pixels, words));
                 film.store(own.start as usize..own.end as usize, words);
                 if params.is_some() {
-                    slots[tile - first].store(&tile_slots(tile), words);
+                    slots[tile - first].store(&pixels, words);
                 }
             };
-            writer.sections(first..first + slots.len(), store).map_err(failed(path))?;
-            first += slots.len();
+            writer.batch(tiles.clone(), trees.len() + 1, store).map_err(failed(path))?;
+            first = tiles.end;
         }
         self.end()?;
-        writer.end(&[]).map_err(failed(path))
+        writer.end(0, |_, _| {}).map_err(failed(path))
     }
 
-    /// Tiles in batches of which the sections of all parts, ten kilobytes each, fit into a few megabytes.
-    fn batches(&self, tiles: Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
-        batches(tiles, (256 / self.parts.len()).clamp(1, 64))
+    /// Tiles in pieces of batches, of which the sections of all parts, ten kilobytes each, fit into a few megabytes.
+    fn pieces(&self, tiles: Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
+        let length = (256 / self.parts.len()).clamp(1, 64);
+        batches(tiles, batch_length(&self.description)).flat_map(move |batch| batches(batch, length))
     }
 
-    /// The sums of a batch's shares of a tree.
-    fn branches(&mut self, params: &Params, tree: usize, batch: &Range<usize>) -> Result<Vec<Branch>, PartError> {
-        let unread = self.unread(batch)?;
+    /// The sums of the shares that some tiles have of a tree.
+    fn branches(&mut self, params: &Params, tree: usize, tiles: &Range<usize>) -> Result<Vec<Branch>, PartError> {
+        let unread = self.unread(tree, tiles)?;
         let sum = |tile: usize| {
             let share = |(part, unread): (&Part, &Vec<Unread>)| {
-                let words = unread[tile - batch.start].words();
+                let words = unread[tile - tiles.start].words();
                 let share = words.and_then(|words| Branch::read(params, tree, &tile_slots(tile), &words).ok());
                 share.ok_or_else(|| part.sections.damaged())
             };
             Ok(Branch::sum(self.parts.iter().zip(&unread).map(share).collect::<Result<_, _>>()?))
         };
-        batch.clone().into_par_iter().map(sum).collect()
+        tiles.clone().into_par_iter().map(sum).collect()
     }
 
     /// Adds the pixels of all parts to a film whose first tile is the frame's tile `first`; what `then` makes of each tile and
@@ -199,12 +201,13 @@ impl Parts {
         let filtered = self.description.filtering != Filtering::None;
         let mut done = Vec::with_capacity(film.tile_count());
         let mut tiles = film.tiles();
-        for batch in self.batches(first..first + tiles.len()) {
-            let unread = self.unread(&batch)?;
+        let run = runs(&self.description) - 1;
+        for piece in self.pieces(first..first + tiles.len()) {
+            let unread = self.unread(run, &piece)?;
             let add = |(tile, pixels): (usize, &mut Tile<'_>)| {
                 let mut sum = Slots::default();
                 for (part, unread) in self.parts.iter().zip(&unread) {
-                    let words = unread[tile - batch.start].words();
+                    let words = unread[tile - piece.start].words();
                     let slots = words.and_then(|words| {
                         let mut rest = words.as_slice();
                         pixels.load(&mut rest)?;
@@ -217,26 +220,30 @@ impl Parts {
                 }
                 Ok(then(tile, sum))
             };
-            let tiles = &mut tiles[batch.start - first..batch.end - first];
-            let of_batch: Result<Vec<T>, PartError> = batch.clone().into_par_iter().zip(tiles).map(add).collect();
-            done.extend(of_batch?);
+            let tiles = &mut tiles[piece.start - first..piece.end - first];
+            let of_piece: Result<Vec<T>, PartError> = piece.clone().into_par_iter().zip(tiles).map(add).collect();
+            done.extend(of_piece?);
         }
         Ok(done)
     }
 
-    /// The next sections, a batch's, of every part.
-    fn unread(&mut self, batch: &Range<usize>) -> Result<Vec<Vec<Unread>>, PartError> {
-        let unread = |part: &mut Part| batch.clone().map(|_| part.sections.unread()).collect();
+    /// The sections of some tiles in a run, of every part. Within a batch those before were read last.
+    fn unread(&mut self, run: usize, tiles: &Range<usize>) -> Result<Vec<Vec<Unread>>, PartError> {
+        let length = batch_length(&self.description);
+        let unread = |part: &mut Part| {
+            if tiles.start % length == 0 {
+                part.go_to(tiles.start / length, run)?;
+            }
+            tiles.clone().map(|_| part.sections.unread()).collect()
+        };
         self.parts.iter_mut().map(unread).collect()
     }
 
     /// Makes sure that all files end where they should.
     fn end(&mut self) -> Result<(), PartError> {
-        for sections in self.parts.iter_mut().map(|part| &mut part.sections) {
-            // Between epochs it is empty, and parts that end within one are not added.
-            if !sections.words()?.is_empty() || sections.rest() > 0 {
-                return Err(sections.damaged());
-            }
+        for part in &mut self.parts {
+            let pieces = part.pieces()?;
+            part.end(pieces)?;
         }
         Ok(())
     }

@@ -4,14 +4,19 @@
 //! |---|---|
 //! | 8 bytes | `TSRpart` and the version of this format |
 //! | a section | header: JSON, UTF-8 |
-//! | for each tree of the filter: a section a tile | its cells, and which pixels read them (`FrameFilter::store_tree`) |
-//! | a section a tile | the sums of the tile's pixels (`Film::store`), then those that the filter keeps of them |
-//! | a section | what the filter shares within an epoch that is not over; none between epochs |
+//! | for each row of tiles: a section | bytes of each of its runs |
+//! | its runs: for each tree of the filter a section a tile | cells, and which pixels read them (`FrameFilter::store_trees`) |
+//! | the last run: a section a tile | the sums of the tile's pixels (`Film::store`), then those that the filter keeps of them |
+//! | a section | the number of those that follow |
+//! | sections | what the filter shares within an epoch that is not over |
 //!
 //! Sections but the header are words: see [`section`]. Everything that is added is an integer, so any order of additions
-//! gives the same bits, and what is written depends on neither the machine nor the number of threads. Sections stand in the
-//! order in which a merge needs them, so that many parts are read side by side, each from its beginning to its end, and
-//! only one tree's cells are in memory at a time.
+//! gives the same bits, and what is written depends on neither the machine nor the number of threads, but for the order in
+//! which an epoch that is not over has its cells.
+//!
+//! Who writes a part goes through its sums once, tile by tile, so that they are in the cache while all that is to be known of
+//! them is written. Who merges parts goes through them once for each tree, for only one tree's cells are in memory at a time:
+//! from run to run, which are long enough to be read quickly.
 
 mod header;
 mod merge;
@@ -23,14 +28,16 @@ use std::io;
 use std::ops::Range;
 use std::path::PathBuf;
 
+use crate::film::TILE;
 use crate::filtering::Filtering;
+use crate::frame::{FrameDescription, Samples};
 
 pub use merge::{Merged, Parts};
 pub use read::Part;
 pub use write::{Written, write};
 
 /// The first bytes; the last is the version.
-const MAGIC: [u8; 8] = *b"TSRpart\x02";
+const MAGIC: [u8; 8] = *b"TSRpart\x03";
 
 /// What keeps a part from being written, read or added.
 #[derive(Debug, thiserror::Error)]
@@ -128,6 +135,22 @@ pub fn storable(filtering: &Filtering) -> Result<(), PartError> {
         Filtering::None | Filtering::Adaptive(..) => Ok(()),
         Filtering::Talk(..) => Err(PartError::Filter(filtering.name())),
     }
+}
+
+/// Tiles of a batch, a row of them: runs of some hundred kilobytes.
+fn batch_length(description: &FrameDescription) -> usize {
+    description.bounds.width().div_ceil(TILE) as usize
+}
+
+/// Number of runs of a batch: one for each tree, and the pixels.
+fn runs(description: &FrameDescription) -> usize {
+    description.filtering.adaptive(&description.surroundings).map_or(0, |params| params.stored_trees()) + 1
+}
+
+/// The sample after the last, if it shares with those before it.
+fn unfinished(description: &FrameDescription, samples: &Samples) -> Option<u64> {
+    let next = samples.ranges().last().map_or(0, |range| range.end);
+    (next % description.filtering.epoch() != 0 && next != description.spp).then_some(next)
 }
 
 /// Tiles in batches of so many.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::header::Header;
 use super::section::Sections;
-use super::{MAGIC, PartError};
+use super::{MAGIC, PartError, batch_length, batches, runs, unfinished};
 use crate::film::{Film, tile_slots};
 use crate::filtering::Filtering;
 use crate::frame::{Accumulation, FrameDescription, Samples};
@@ -21,6 +21,10 @@ pub struct Part {
     pub(super) counters: Counters,
     pub(super) filter_paths: [u64; 2],
     pub(super) sections: Sections,
+    /// Where the first batch begins.
+    first: u64,
+    /// Where the runs of batches begin, and the last one ends, of those that were gone to.
+    batches: Vec<Vec<u64>>,
 }
 
 impl Part {
@@ -54,7 +58,8 @@ impl Part {
             return Err(PartError::Truncated(path.to_owned()));
         }
         let (counters, filter_paths) = (header.counters(), header.filter_paths);
-        Ok(Self { path: path.to_owned(), description, samples, counters, filter_paths, sections })
+        let (path, first) = (path.to_owned(), sections.position());
+        Ok(Self { path, description, samples, counters, filter_paths, sections, first, batches: Vec::new() })
     }
 
     /// The part as a frame to go on with.
@@ -63,46 +68,85 @@ impl Part {
     /// [`PartError`]: it is not whole, or damaged.
     pub fn begin(mut self) -> Result<Accumulation, PartError> {
         let mut frame = Accumulation::new(self.description.clone());
-        let epoch = self.add_to(&mut frame)?;
-        if let Some(filter) = &mut frame.filter {
-            let next = self.samples.ranges().last().map_or(0, |range| range.end);
-            filter.load_epoch(next, &epoch).map_err(|_| self.sections.damaged())?;
+        let mut pieces = self.add_to(&mut frame)?;
+        let next = unfinished(&self.description, &self.samples);
+        if let Some((filter, next)) = frame.filter.as_mut().zip(next) {
+            filter.begin_stored_epoch(next);
+            for _ in 0..std::mem::take(&mut pieces) {
+                let words = self.sections.words()?;
+                filter.load_epoch(&words).map_err(|_| self.sections.damaged())?;
+            }
         }
+        self.end(pieces)?;
         Ok(frame)
     }
 
-    /// Adds the part's sums to those of a frame that it belongs to, and that has none of its samples; what the filter shares
-    /// within an epoch.
-    pub(super) fn add_to(&mut self, frame: &mut Accumulation) -> Result<Vec<u64>, PartError> {
-        let sections = &mut self.sections;
-        let tiles = frame.film.tile_count();
-        if let Some(filter) = &mut frame.filter {
-            for (tree, tile) in (0..filter.stored_trees()).flat_map(|tree| (0..tiles).map(move |tile| (tree, tile))) {
-                let words = sections.words()?;
-                filter.load_tree(tree, tile, &tile_slots(tile), &words).map_err(|_| sections.damaged())?;
+    /// Adds the part's sums to those of a frame that it belongs to, and that has none of its samples; in how many sections
+    /// that follow it is what the filter shares within an epoch.
+    pub(super) fn add_to(&mut self, frame: &mut Accumulation) -> Result<u64, PartError> {
+        let mut tiles = frame.film.tiles();
+        let trees = runs(&self.description) - 1;
+        for (number, batch) in batches(0..tiles.len(), batch_length(&self.description)).enumerate() {
+            self.go_to(number, 0)?;
+            let sections = &mut self.sections;
+            if let Some(filter) = &mut frame.filter {
+                for (tree, tile) in (0..trees).flat_map(|tree| batch.clone().map(move |tile| (tree, tile))) {
+                    let words = sections.words()?;
+                    filter.load_tree(tree, tile, &tile_slots(tile), &words).map_err(|_| sections.damaged())?;
+                }
             }
+            for tile in batch {
+                let words = sections.words()?;
+                let mut rest = words.as_slice();
+                tiles[tile].load(&mut rest).ok_or_else(|| sections.damaged())?;
+                match &mut frame.filter {
+                    Some(filter) => {
+                        filter.load_slots(tile, &tile_slots(tile), rest).map_err(|_| sections.damaged())?;
+                    }
+                    None if rest.is_empty() => {}
+                    None => return Err(sections.damaged()),
+                }
+            }
+        }
+        if let Some(filter) = &mut frame.filter {
             filter.add_paths(self.filter_paths);
         }
-        for (tile, mut pixels) in frame.film.tiles().into_iter().enumerate() {
-            let words = sections.words()?;
-            let mut rest = words.as_slice();
-            pixels.load(&mut rest).ok_or_else(|| sections.damaged())?;
-            match &mut frame.filter {
-                Some(filter) => {
-                    filter.load_slots(tile, &tile_slots(tile), rest).map_err(|_| sections.damaged())?;
-                }
-                None if rest.is_empty() => {}
-                None => return Err(sections.damaged()),
-            }
-        }
-        let epoch = sections.words()?;
-        if sections.rest() > 0 {
-            return Err(sections.damaged());
-        }
         for range in self.samples.ranges() {
-            frame.samples.insert(range.clone()).map_err(|_| sections.damaged())?;
+            frame.samples.insert(range.clone()).map_err(|_| self.sections.damaged())?;
         }
         frame.counters += self.counters;
-        Ok(epoch)
+        self.pieces()
+    }
+
+    /// Goes to a run of a batch, of which those before were gone to before.
+    pub(super) fn go_to(&mut self, batch: usize, run: usize) -> Result<(), PartError> {
+        if batch == self.batches.len() {
+            let begin = self.batches.last().map_or(self.first, |runs| runs[runs.len() - 1]);
+            self.sections.go_to(begin)?;
+            let lengths = self.sections.words()?;
+            let mut begins = vec![self.sections.position()];
+            for length in &lengths {
+                begins.extend(begins[begins.len() - 1].checked_add(*length));
+            }
+            if lengths.len() != runs(&self.description) || begins.len() != lengths.len() + 1 {
+                return Err(self.sections.damaged());
+            }
+            self.batches.push(begins);
+        }
+        self.sections.go_to(self.batches[batch][run])
+    }
+
+    /// Reads, after the last run, how many sections are left.
+    pub(super) fn pieces(&mut self) -> Result<u64, PartError> {
+        let end = self.batches.last().map_or(self.first, |runs| runs[runs.len() - 1]);
+        match *self.sections.words()? {
+            [pieces] if self.sections.position() > end => Ok(pieces),
+            _ => Err(self.sections.damaged()),
+        }
+    }
+
+    /// Makes sure that nothing is left: of so many sections none, and no bytes.
+    pub(super) fn end(&self, sections: u64) -> Result<(), PartError> {
+        if sections == 0 && self.sections.rest() == 0 { Ok(()) } else { Err(self.sections.damaged()) }
     }
 }

@@ -24,22 +24,26 @@ pub fn append_bytes(file: &mut Vec<u8>, bytes: &[u8]) {
 /// Appends a section of words.
 pub fn append_words(file: &mut Vec<u8>, words: &[u64]) {
     let begin = file.len();
-    // Room for all, and for eight bytes from wherever a word begins.
-    file.resize(begin + PREFIX + 8 + words.len().div_ceil(2) + 8 * words.len() + 8, 0);
-    let section = &mut file[begin..];
-    section[PREFIX..PREFIX + 8].copy_from_slice(&(words.len() as u64).to_le_bytes());
-    let mut end = PREFIX + 8;
-    for pair in words.chunks(2) {
-        let lengths = [0, 1].map(|at| pair.get(at).map_or(0, |word| length(*word)));
-        section[end] = (lengths[0] | lengths[1] << 4) as u8;
-        end += 1;
-        for (word, length) in pair.iter().zip(lengths) {
-            // What is behind the length is written over next.
-            section[end..end + 8].copy_from_slice(&word.to_le_bytes());
-            end += length;
+    file.resize(begin + PREFIX, 0);
+    file.extend((words.len() as u64).to_le_bytes());
+    // Some pairs at a time, with room for eight bytes from wherever a word begins.
+    const PAIRS: usize = 32;
+    let mut room = [0; 17 * PAIRS + 8];
+    for words in words.chunks(2 * PAIRS) {
+        let mut end = 0;
+        for pair in words.chunks(2) {
+            let pair = [pair[0], pair.get(1).copied().unwrap_or(0)];
+            let lengths = pair.map(length);
+            room[end] = (lengths[0] | lengths[1] << 4) as u8;
+            end += 1;
+            for (word, length) in pair.iter().zip(lengths) {
+                // What is behind the length is written over next.
+                room[end..end + 8].copy_from_slice(&word.to_le_bytes());
+                end += length;
+            }
         }
+        file.extend_from_slice(&room[..end]);
     }
-    file.truncate(begin + end);
     seal(&mut file[begin..]);
 }
 
@@ -53,7 +57,7 @@ fn seal(section: &mut [u8]) {
 fn length(word: u64) -> usize {
     // Bits that differ from the sign; the sign takes one more.
     let bits = 64 - (word ^ (word as i64 >> 63) as u64).leading_zeros() as usize;
-    if word == 0 { 0 } else { bits / 8 + 1 }
+    bits / 8 + usize::from(word != 0)
 }
 
 /// The words of such a section's bytes, which eight more bytes follow; `None` where there are none.
@@ -87,8 +91,9 @@ const PADDING: usize = 8;
 pub struct Sections {
     path: PathBuf,
     reader: BufReader<File>,
-    /// Bytes that are not read yet, so that no length asks for more memory than there are bytes.
-    rest: u64,
+    length: u64,
+    /// Bytes before the next one.
+    at: u64,
 }
 
 impl Sections {
@@ -96,16 +101,38 @@ impl Sections {
     pub fn open<const N: usize>(path: &Path) -> Result<(Self, [u8; N]), PartError> {
         let error = |why| PartError::File { what: "read", path: path.to_owned(), why };
         let file = File::open(path).map_err(error)?;
-        let rest = file.metadata().map_err(error)?.len();
-        let mut sections = Self { path: path.to_owned(), reader: BufReader::with_capacity(1 << 18, file), rest };
+        let length = file.metadata().map_err(error)?.len();
+        let reader = BufReader::with_capacity(1 << 18, file);
+        let mut sections = Self { path: path.to_owned(), reader, length, at: 0 };
         let mut first = [0; N];
         sections.read(&mut first)?;
         Ok((sections, first))
     }
 
-    /// Bytes that are not read yet.
+    /// Bytes before the next section.
+    pub fn position(&self) -> u64 {
+        self.at
+    }
+
+    /// Bytes behind the last section that was read.
     pub fn rest(&self) -> u64 {
-        self.rest
+        self.length.saturating_sub(self.at)
+    }
+
+    /// Goes to the section that begins at a position.
+    pub fn go_to(&mut self, position: u64) -> Result<(), PartError> {
+        if position > self.length {
+            return Err(PartError::Truncated(self.path.clone()));
+        }
+        // Files have less than 2^63 bytes.
+        let step = position as i64 - self.at as i64;
+        self.reader.seek_relative(step).map_err(|why| self.unreadable(why))?;
+        self.at = position;
+        Ok(())
+    }
+
+    fn unreadable(&self, why: io::Error) -> PartError {
+        PartError::File { what: "read", path: self.path.clone(), why }
     }
 
     /// The bytes of the next section.
@@ -131,7 +158,8 @@ impl Sections {
         self.read(&mut prefix)?;
         let [length @ .., c0, c1, c2, c3] = prefix;
         let length = u64::from_le_bytes(length);
-        if length > self.rest {
+        // So that no length asks for more memory than there are bytes.
+        if length > self.rest() {
             return Err(PartError::Truncated(self.path.clone()));
         }
         let mut padded = vec![0; length as usize + PADDING];
@@ -142,9 +170,9 @@ impl Sections {
     fn read(&mut self, bytes: &mut [u8]) -> Result<(), PartError> {
         self.reader.read_exact(bytes).map_err(|why| match why.kind() {
             io::ErrorKind::UnexpectedEof => PartError::Truncated(self.path.clone()),
-            _ => PartError::File { what: "read", path: self.path.clone(), why },
+            _ => self.unreadable(why),
         })?;
-        self.rest = self.rest.saturating_sub(bytes.len() as u64);
+        self.at += bytes.len() as u64;
         Ok(())
     }
 }

@@ -8,10 +8,10 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::header::Header;
-use super::{MAGIC, PartError, batches, section, storable};
+use super::{MAGIC, PartError, batch_length, batches, runs, section, storable, unfinished};
 use crate::draft::Draft;
 use crate::film::tile_slots;
-use crate::frame::Accumulation;
+use crate::frame::{Accumulation, FrameDescription};
 
 /// A part that is written and has not got its name yet.
 #[derive(Debug)]
@@ -42,25 +42,23 @@ pub fn write(frame: &mut Accumulation, path: &Path) -> Result<Written, PartError
     }
     let written = || {
         let mut writer = Writer::begin(path, &header(frame))?;
-        let tiles = frame.film.tile_count();
-        if let Some(filter) = &frame.filter {
-            for tree in 0..filter.stored_trees() {
-                writer.sections(0..tiles, |tile, words| filter.store_tree(tree, tile, &tile_slots(tile), words))?;
-            }
-        }
-        writer.sections(0..tiles, |tile, words| {
+        let Accumulation { film, filter, .. } = &*frame;
+        writer.batches(&frame.description, |tile, runs| {
             let pixels = tile_slots(tile);
-            frame.film.store(pixels.start as usize..pixels.end as usize, words);
-            if let Some(filter) = &frame.filter {
+            let (words, trees) = runs.split_last_mut().expect("the run of the pixels");
+            film.store(pixels.start as usize..pixels.end as usize, words);
+            if let Some(filter) = filter {
+                filter.store_trees(tile, &pixels, trees);
                 filter.store_slots(tile, &pixels, words);
             }
         })?;
-        let mut words = Vec::new();
-        if let Some(filter) = &frame.filter {
-            let next = frame.samples.ranges().last().map_or(0, |range| range.end);
-            filter.store_epoch(next, &mut words);
+        match filter.as_ref().zip(unfinished(&frame.description, &frame.samples)) {
+            Some((filter, next)) => {
+                let epoch = filter.epoch(next);
+                writer.end(epoch.len(), |piece, words| filter.store_epoch(&epoch[piece], words))
+            }
+            None => writer.end(0, |_, _| {}),
         }
-        writer.end(&words)
     };
     written().map_err(failed(path))
 }
@@ -81,14 +79,17 @@ pub struct Writer {
     file: File,
     bytes: u64,
     /// Room for sections, to be used again: asking the system for it takes as long as filling it.
-    room: Vec<Vec<u8>>,
+    room: Vec<Group>,
 }
 
-/// Tiles of which a thread writes the sections into one piece of memory.
-const GROUP: usize = 4;
+/// Sections of some tiles that lie together: by run.
+type Group = Vec<Vec<u8>>;
 
-/// Groups that are made while as many are on their way to the file: enough for many threads, at a tenth of a megabyte each.
-const GROUPS: usize = 32;
+/// Tiles of which a thread makes the sections: a megabyte of sums, which stay in the cache while all trees are stored.
+const GROUP: usize = 2;
+
+/// Pieces of an epoch that are made at once: some tens of megabytes.
+const PIECES: usize = 64;
 
 impl Writer {
     /// Writes all that comes before the sums.
@@ -98,47 +99,84 @@ impl Writer {
         let mut writer = Self { draft, file, bytes: 0, room: Vec::new() };
         let mut first = MAGIC.to_vec();
         section::append_bytes(&mut first, &serde_json::to_vec(header).map_err(io::Error::other)?);
-        writer.put(&[first])?;
+        writer.put(&first)?;
         Ok(writer)
     }
 
-    /// Writes a section for each of some tiles: what `store` appends.
-    pub fn sections(&mut self, tiles: Range<usize>, store: impl Fn(usize, &mut Vec<u64>) + Sync) -> io::Result<()> {
-        let encode = |words: &mut Vec<u64>, (bytes, tiles): (&mut Vec<u8>, Range<usize>)| {
-            bytes.clear();
-            for tile in tiles {
-                words.clear();
-                store(tile, words);
-                section::append_words(bytes, words);
-            }
-        };
-        // Some groups go to the disk while the next ones are made.
+    /// Writes all batches of a frame's tiles: what `store` appends for a tile to the words of each run.
+    pub fn batches(
+        &mut self,
+        description: &FrameDescription,
+        store: impl Fn(usize, &mut [Vec<u64>]) + Sync,
+    ) -> io::Result<()> {
+        // A batch goes to the disk while the next one is made.
         let (mut next, mut done) = (std::mem::take(&mut self.room), Vec::new());
-        for batch in batches(tiles, GROUPS * GROUP) {
-            let groups: Vec<Range<usize>> = batches(batch, GROUP).collect();
-            next.resize_with(groups.len(), Vec::new);
-            let made = || next.par_iter_mut().zip(groups).for_each_init(Vec::new, encode);
-            rayon::join(made, || self.put(&done)).1?;
+        for batch in batches(0..description.tile_count(), batch_length(description)) {
+            let made = || encode(&mut next, runs(description), batch, &store);
+            rayon::join(made, || self.put_batch(&done)).1?;
             std::mem::swap(&mut next, &mut done);
         }
-        self.put(&done)?;
+        self.put_batch(&done)?;
         self.room = done;
         Ok(())
     }
 
-    /// Writes the last section.
-    pub fn end(mut self, epoch: &[u64]) -> io::Result<Written> {
-        let mut last = Vec::new();
-        section::append_words(&mut last, epoch);
-        self.put(&[last])?;
+    /// Writes one batch, likewise.
+    pub fn batch(
+        &mut self,
+        tiles: Range<usize>,
+        runs: usize,
+        store: impl Fn(usize, &mut [Vec<u64>]) + Sync,
+    ) -> io::Result<()> {
+        let mut groups = std::mem::take(&mut self.room);
+        encode(&mut groups, runs, tiles, store);
+        self.put_batch(&groups)?;
+        self.room = groups;
+        Ok(())
+    }
+
+    /// Writes the last sections: of `pieces` pieces of an epoch what `store` appends.
+    pub fn end(mut self, pieces: usize, store: impl Fn(usize, &mut Vec<u64>) + Sync) -> io::Result<Written> {
+        let mut count = Vec::new();
+        section::append_words(&mut count, &[pieces as u64]);
+        self.put(&count)?;
+        let mut groups = std::mem::take(&mut self.room);
+        for batch in batches(0..pieces, PIECES) {
+            encode(&mut groups, 1, batch, |piece, words| store(piece, &mut words[0]));
+            groups.iter().flatten().try_for_each(|sections| self.put(sections))?;
+        }
         Ok(Written { draft: self.draft, bytes: self.bytes })
     }
 
-    fn put(&mut self, pieces: &[Vec<u8>]) -> io::Result<()> {
-        for bytes in pieces {
-            self.bytes += bytes.len() as u64;
-            self.file.write_all(bytes)?;
-        }
-        Ok(())
+    /// Writes the lengths of the runs of a batch, and the runs.
+    fn put_batch(&mut self, groups: &[Group]) -> io::Result<()> {
+        let Some(runs) = groups.first().map(Vec::len) else { return Ok(()) };
+        let length = |run: usize| groups.iter().map(|group| group[run].len() as u64).sum();
+        let mut lengths = Vec::new();
+        section::append_words(&mut lengths, &(0..runs).map(length).collect::<Vec<u64>>());
+        self.put(&lengths)?;
+        (0..runs).try_for_each(|run| groups.iter().try_for_each(|group| self.put(&group[run])))
     }
+
+    fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.bytes += bytes.len() as u64;
+        self.file.write_all(bytes)
+    }
+}
+
+/// Makes the sections of some tiles, run by run: what `store` appends to the words of each.
+fn encode(groups: &mut Vec<Group>, runs: usize, tiles: Range<usize>, store: impl Fn(usize, &mut [Vec<u64>]) + Sync) {
+    let of_groups: Vec<Range<usize>> = batches(tiles, GROUP).collect();
+    groups.resize_with(of_groups.len(), Vec::new);
+    let encode = |words: &mut Vec<Vec<u64>>, (group, tiles): (&mut Group, Range<usize>)| {
+        words.resize_with(runs, Vec::new);
+        group.resize_with(runs, Vec::new);
+        group.iter_mut().for_each(Vec::clear);
+        for tile in tiles {
+            words.iter_mut().for_each(Vec::clear);
+            store(tile, words);
+            group.iter_mut().zip(words.iter()).for_each(|(bytes, words)| section::append_words(bytes, words));
+        }
+    };
+    groups.par_iter_mut().zip(of_groups).for_each_init(Vec::new, encode);
 }

@@ -1,9 +1,11 @@
 //! Spheres, partial spheres, and the ellipsoids that affine maps make of them.
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::placement::{Placement, azimuth, sweep};
-use super::{ShapeHit, ShapeSample, SurfacePoint, in_range, rounded, usable};
+use super::{ShapeHit, ShapeSample, SurfacePoint, finite_solid_angle_pdf, in_range, rounded, usable};
 use crate::math::{Transform, warp};
 
 /// A sphere around the origin of its own space, cut at two heights and swept around z.
@@ -40,7 +42,7 @@ impl Sphere {
         let cut = |z: f32| f64::from(z).clamp(-radius, radius);
         let (z_min, z_max) = (cut(z_min.min(z_max)), cut(z_min.max(z_max)));
         let phi_max = sweep(phi_max);
-        let whole = z_min == -radius && z_max == radius && phi_max == std::f64::consts::TAU;
+        let whole = z_min == -radius && z_max == radius && phi_max == TAU;
         let theta = [z_min, z_max].map(|z| (z / radius).clamp(-1.0, 1.0).acos());
         let placement = Placement::new(world_from_shape, reverse_orientation)?;
         (z_max > z_min).then_some(Self { placement, radius, z_min, z_max, theta, phi_max, whole })
@@ -99,7 +101,8 @@ impl Sphere {
     }
 
     /// See [`super::Shape::sample`]. A whole sphere is sampled by solid angle: from outside by the cone that it fills,
-    /// from inside by the whole sphere of directions. An ellipsoid or a part is sampled by area.
+    /// from inside by the whole sphere of directions. From the sphere itself it is sampled by area, as are an ellipsoid or a
+    /// part from anywhere.
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<ShapeSample> {
         let Some(round) = self.round() else {
             let local = self.at(u.x.into(), u.y.into());
@@ -110,13 +113,14 @@ impl Sphere {
         let local = n_local * self.radius;
         let slack = DVec3::splat(round.radius * f64::EPSILON * 16.0);
         let point = rounded(round.centre + outwards * round.radius, slack);
-        usable(point, self.placement.normal(n_local), self.uv(local), round.pdf(from))
+        let n = self.placement.normal(n_local);
+        usable(point, n, self.uv(local), round.pdf(from, point.p, n))
     }
 
     /// See [`super::Shape::pdf`].
     pub fn pdf(&self, from: Vec3, point: Vec3, n: Vec3) -> f32 {
         match self.round() {
-            Some(round) => round.pdf(from),
+            Some(round) => round.pdf(from, point, n),
             None => self.placement.area_sample_pdf(from, point, n, self.local_area()),
         }
     }
@@ -162,17 +166,30 @@ struct RoundSphere {
     radius: f64,
 }
 
+/// Where a sphere is seen from.
+enum View {
+    Inside,
+    /// With 1 − cosine of the half angle of the cone that it fills.
+    Outside(f64),
+    /// From itself, on a side that rounding hides: its inner side sees all of it, its outer side nothing.
+    Touching,
+}
+
 impl RoundSphere {
     /// The outward unit normal at the sampled point.
     fn sample(&self, from: Vec3, u: Vec2) -> Option<DVec3> {
         let to_centre = self.centre - from.as_dvec3();
-        let Some(one_minus_cos_max) = self.one_minus_cos_max(to_centre) else {
-            let direction = warp::uniform_sphere(u).as_dvec3().normalize();
-            // From −to_centre inside the sphere of radius 1 along a direction that is uniform: the one exit.
-            let o = -to_centre / self.radius;
-            let b = o.dot(direction);
-            let t = -b + (b * b + 1.0 - o.length_squared()).max(0.0).sqrt();
-            return (o + direction * t).try_normalize();
+        let one_minus_cos_max = match self.view(from) {
+            View::Inside => {
+                let direction = warp::uniform_sphere(u).as_dvec3().normalize();
+                // From −to_centre inside the sphere of radius 1 along a direction that is uniform: the one exit.
+                let o = -to_centre / self.radius;
+                let b = o.dot(direction);
+                let t = -b + (b * b + 1.0 - o.length_squared()).max(0.0).sqrt();
+                return (o + direction * t).try_normalize();
+            }
+            View::Touching => return warp::uniform_sphere(u).as_dvec3().try_normalize(),
+            View::Outside(one_minus_cos_max) => one_minus_cos_max,
         };
         // A direction uniform in the cone, then the nearer of the two points where it meets the sphere, as the angle at
         // the centre: the direction's height above the axis there is sin² θ · d.
@@ -182,23 +199,36 @@ impl RoundSphere {
         let sin_max = self.radius / distance;
         let cos_alpha = sin_squared / sin_max + cos * (1.0 - sin_squared / (sin_max * sin_max)).max(0.0).sqrt();
         let sin_alpha = (1.0 - cos_alpha * cos_alpha).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (f64::from(u.y) * std::f64::consts::TAU).sin_cos();
+        let (sin_phi, cos_phi) = (f64::from(u.y) * TAU).sin_cos();
         let axis = to_centre / distance;
         let (s, t) = axis.any_orthonormal_pair();
         (axis * -cos_alpha + (s * cos_phi + t * sin_phi) * sin_alpha).try_normalize()
     }
 
-    /// Density (sr⁻¹), the same for all sampled directions.
-    fn pdf(&self, from: Vec3) -> f32 {
-        let solid_angle_over_2_pi = self.one_minus_cos_max(self.centre - from.as_dvec3()).unwrap_or(2.0);
-        (1.0 / (std::f64::consts::TAU * solid_angle_over_2_pi)) as f32
+    /// Density (sr⁻¹) of the direction to `point` with the normal `n`.
+    fn pdf(&self, from: Vec3, point: Vec3, n: Vec3) -> f32 {
+        let uniform_over = |solid_angle_over_2_pi: f64| (1.0 / (TAU * solid_angle_over_2_pi)) as f32;
+        match self.view(from) {
+            View::Inside => uniform_over(2.0),
+            View::Outside(one_minus_cos_max) => uniform_over(one_minus_cos_max),
+            View::Touching => finite_solid_angle_pdf(1.0 / (2.0 * TAU * self.radius * self.radius), from, point, n),
+        }
     }
 
-    /// 1 − cosine of the half angle of the cone that the sphere fills; `None` from inside.
-    fn one_minus_cos_max(&self, to_centre: DVec3) -> Option<f64> {
-        let sin_squared = self.radius * self.radius / to_centre.length_squared();
+    fn view(&self, from: Vec3) -> View {
+        let from = from.as_dvec3();
+        let squared = self.centre.distance_squared(from);
+        // A point of the sphere is rounded by at most 2⁻²⁴ of its coordinates; the same again for what came before that.
+        const ROUNDING: f64 = f32::EPSILON as f64;
+        if (squared.sqrt() - self.radius).abs() <= ROUNDING * from.length() {
+            return View::Touching;
+        }
+        let sin_squared = self.radius * self.radius / squared;
+        if sin_squared >= 1.0 {
+            return View::Inside;
+        }
         // sin²θ / (1 + cosθ), which does not cancel for a far sphere.
-        (sin_squared < 1.0).then(|| sin_squared / (1.0 + (1.0 - sin_squared).sqrt()))
+        View::Outside(sin_squared / (1.0 + (1.0 - sin_squared).sqrt()))
     }
 }
 
@@ -225,6 +255,28 @@ mod tests {
             ];
             check_sampling(&Shape::Sphere(sphere(&placement, [-1.5, 1.5], 360.0).into()), &from);
             check_sampling(&Shape::Sphere(sphere(&placement, [-0.9, 1.2], 250.0).into()), &from);
+        }
+    }
+
+    #[test]
+    fn from_its_own_points_a_sphere_is_seen_by_area_whichever_side_they_are_rounded_to() {
+        for placement in placements() {
+            let sphere = sphere(&placement, [-1.5, 1.5], 360.0);
+            let Some(round) = sphere.round() else { continue };
+            let mut beside = [0; 2];
+            for k in 0..200 {
+                let u = Vec2::new((k as f32 + 0.5) / 200.0, (k as f32 * 0.618_034).fract());
+                let from = (round.centre + warp::uniform_sphere(u).as_dvec3().normalize() * round.radius).as_vec3();
+                beside[usize::from(round.centre.distance(from.as_dvec3()) > round.radius)] += 1;
+                // Seen from a point of the sphere, equal areas are equal shares of the cosine.
+                let seen = sphere.sample(from, Vec2::new(0.3, 0.8)).unwrap();
+                let wi = (seen.point.p - from).as_dvec3().normalize();
+                let inwards = (round.centre - from.as_dvec3()).normalize();
+                let expected = wi.dot(inwards) / std::f64::consts::PI;
+                assert!((f64::from(seen.pdf) / expected - 1.0).abs() < 1e-5, "{} {expected}", seen.pdf);
+                assert_eq!(seen.pdf, sphere.pdf(from, seen.point.p, seen.n));
+            }
+            assert!(beside[0] > 20 && beside[1] > 20, "rounding takes no sides: {beside:?}");
         }
     }
 

@@ -1,17 +1,19 @@
 //! What the features of scenes cost: one JSON line each.
 //!
-//! `bench_features [WIDTHxHEIGHT [SPP [ROUNDS]]]`
+//! `bench_features [WIDTHxHEIGHT [SPP]]`
 //!
 //! Each feature is added to a room of triangles twice: defined but used by nothing, which should cost nothing, and in use.
-//! The price is the processor time of tracing over that of the room alone, on one thread; every round renders all variants one
-//! after the other, and the median over the rounds of each one's ratio to its own round's room is told, so that a machine that
-//! slows down does so for all. Never a test: it only prints.
+//! The price is the number of instructions of tracing `SPP` samples of each pixel over that of the room alone. Valgrind counts
+//! them in a process of one thread, with `SPP` samples and with twice as many: what they differ by is tracing alone. Such a
+//! count is the same on a busy machine and on every run, as no time is; what it does not see is what a cache misses. Never a
+//! test: it only prints.
 #![forbid(unsafe_code)]
 #![allow(clippy::print_stdout)]
 
-use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
 
-use renderer::render::{Job, Prepared, Unobserved, prepare, thread_pool, trace};
+use renderer::render::{Job, Unobserved, prepare, thread_pool, trace};
 use tests::small::{PLAIN, SceneFile, room};
 
 /// A change of the room's text.
@@ -110,8 +112,14 @@ const FEATURES: [Feature; 17] = [
         used: "Shape \"bilinearmesh\" \"point3 P\" [ 0 0 1 0.1 0 1 0 0.1 1 0.1 0.1 1.1 ]\n",
         at: WORLD,
     },
+    // Nothing defines them but their use.
     Feature { name: "auxiliary channels", unused: FILM, used: "Film \"gbuffer\"", at: FILM },
-    Feature { name: "clamping", unused: FILM, used: "Film \"rgb\" \"float maxcomponentvalue\" 10", at: FILM },
+    Feature {
+        name: "clamping",
+        unused: "Film \"rgb\" \"float maxcomponentvalue\" 1e30",
+        used: "Film \"rgb\" \"float maxcomponentvalue\" 10",
+        at: FILM,
+    },
     Feature {
         name: "regularisation",
         unused: "Integrator \"path\" \"bool regularize\" false",
@@ -137,44 +145,31 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, scene, spp] = &arguments[..] {
+        if first == TRACE {
+            return trace_alone(scene.into(), spp.parse()?);
+        }
+    }
     let text = |at: usize, otherwise: &str| arguments.get(at).map_or(otherwise.to_owned(), String::clone);
-    let (size, spp, rounds) = (text(0, "160x120"), text(1, "64"), text(2, "9"));
+    let (size, spp) = (text(0, "32x24"), text(1, "16").parse()?);
     let (width, height) = size.split_once('x').ok_or("the size is WIDTHxHEIGHT")?;
-    let (size, spp, rounds): ([u32; 2], u64, usize) =
-        ([width.parse()?, height.parse()?], spp.parse()?, rounds.parse()?);
 
-    let base = room(size, 1.0, 1.0, PLAIN);
+    let base = room([width.parse()?, height.parse()?], 1.0, 1.0, PLAIN);
     let variant = |feature: &Feature, change: &str| match feature.at {
         WORLD => base.replacen(WORLD, &format!("{WORLD}AttributeBegin\n{change}AttributeEnd\n"), 1),
         at => base.replacen(at, change, 1),
     };
     let image = image();
-    let scene = |text: &str| SceneFile::new(text).with("image.ppm", &image);
-    let mut scenes = vec![scene(&base)];
+    let count = |text: &str| instructions(&SceneFile::new(text).with("image.ppm", &image), spp);
+    let room = count(&base)? as f64;
     for feature in &FEATURES {
         assert!(base.contains(feature.at), "the room has no {}", feature.at);
-        scenes.extend([feature.unused, feature.used].map(|change| scene(&variant(feature, change))));
-    }
-    let mut ratios = vec![Vec::new(); scenes.len()];
-    for _ in 0..rounds.max(1) {
-        // The first of a round would pay for what the last one has left in the caches.
-        seconds(&scenes[0], spp)?;
-        let seconds = scenes.iter().map(|scene| seconds(scene, spp)).collect::<Result<Vec<f64>, Failure>>()?;
-        ratios.iter_mut().zip(&seconds).for_each(|(ratios, x)| ratios.push(x / seconds[0]));
-    }
-    let price = |of: usize| {
-        let mut sorted = ratios[of].clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        100.0 * (sorted[sorted.len() / 2] - 1.0)
-    };
-    for (i, feature) in FEATURES.iter().enumerate() {
-        let line = serde_json::json!({
-            "feature": feature.name,
-            "unused_percent": price(2 * i + 1),
-            "used_percent": price(2 * i + 2),
-            "rounds": rounds,
-        });
-        println!("{line}");
+        let price = |change: &str| -> Result<f64, Failure> {
+            let percent = 100.0 * (count(&variant(feature, change))? as f64 / room - 1.0);
+            Ok((percent * 1000.0).round() / 1000.0)
+        };
+        let (unused, used) = (price(feature.unused)?, price(feature.used)?);
+        println!("{}", serde_json::json!({"feature": feature.name, "unused_percent": unused, "used_percent": used}));
     }
     Ok(())
 }
@@ -186,21 +181,34 @@ fn image() -> Vec<u8> {
     bytes
 }
 
-/// Processor time of tracing, of the one thread that does it.
-fn seconds(scene: &SceneFile, spp: u64) -> Result<f64, Failure> {
-    let job = Job { scene: scene.path(), spp: Some(spp), seed: Some(1), threads: 1, ..Job::default() };
-    let traced = || -> Result<f64, Failure> {
-        let prepared: Prepared = prepare(&job, &Unobserved)?;
-        let start = processor_seconds()?;
-        trace(prepared, None, None, &Unobserved).develop();
-        Ok(processor_seconds()? - start)
-    };
-    thread_pool(1)?.install(traced)
+/// The first argument of the process whose instructions are counted.
+const TRACE: &str = "trace";
+
+/// Traces `spp` samples of each pixel of a scene on one thread.
+fn trace_alone(scene: PathBuf, spp: u64) -> Result<(), Failure> {
+    let job = Job { scene, spp: Some(spp), seed: Some(1), threads: 1, ..Job::default() };
+    thread_pool(1)?.install(|| -> Result<(), Failure> {
+        trace(prepare(&job, &Unobserved)?, None, None, &Unobserved).develop();
+        Ok(())
+    })
 }
 
-/// Seconds that the calling thread has run, to the nanosecond.
-fn processor_seconds() -> Result<f64, Failure> {
-    let text = fs::read_to_string("/proc/thread-self/schedstat")?;
-    let nanoseconds: u64 = text.split_whitespace().next().ok_or("an empty schedstat")?.parse()?;
-    Ok(nanoseconds as f64 * 1e-9)
+/// Instructions of tracing `spp` samples of each pixel.
+fn instructions(scene: &SceneFile, spp: u64) -> Result<u64, Failure> {
+    let (once, twice) = (process_instructions(scene, spp)?, process_instructions(scene, 2 * spp)?);
+    twice.checked_sub(once).ok_or_else(|| "more samples took fewer instructions".into())
+}
+
+/// Instructions of a process that does nothing else.
+fn process_instructions(scene: &SceneFile, spp: u64) -> Result<u64, Failure> {
+    let output = Command::new("valgrind")
+        .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
+        .args([std::env::current_exe()?, TRACE.into(), scene.path(), spp.to_string().into()])
+        .output()
+        .map_err(|why| format!("cannot run valgrind, which counts instructions: {why}; install it"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let count = said.lines().find_map(|line| line.split_once("I refs:").or(line.split_once("I   refs:")));
+    let (_, count) =
+        count.filter(|_| output.status.success()).ok_or_else(|| format!("valgrind counted nothing:\n{said}"))?;
+    Ok(count.replace(',', "").trim().parse()?)
 }

@@ -5,7 +5,7 @@ use renderer::render::Job;
 use renderer::world::Techniques;
 use tests::small::{adaptive, values};
 
-use super::support::{ROUNDING, check_all, check_mean, closed_box, diffuse, frame, job, pinhole, scene, sky};
+use super::support::{ROUNDING, check_all, check_mean, closed_box, diffuse, frame, job, lamp, pinhole, scene, sky};
 
 /// A closed box that emits 1 and reflects `albedo`, with paths of `depth` scatterings.
 fn glowing_box(albedo: f64, depth: u32) -> String {
@@ -68,4 +68,43 @@ fn thousands_of_total_reflections_keep_energy() {
     let camera = format!("LookAt 0 0 0  0.5 0.2 0.8  0 1 0\n{}", pinhole(5.0));
     let text = scene([8, 8], 1_000_000, &camera, &(sky(1.0) + glass + &closed_box(1.0)));
     check_mean("total reflections", &frame(&text, job(16, Filtering::None)), 2.25, 1e-3);
+}
+
+#[test]
+fn paths_that_nothing_absorbs_end() {
+    // Without a rule of their own these would go on for 2³¹ bounces: minutes for each.
+    let job = job(1, Filtering::None);
+    let mirror = "Material \"conductor\" \"rgb reflectance\" [ 1 1 1 ]\nShape \"sphere\" \"float radius\" 3\n";
+    for world in [diffuse(1.0) + &closed_box(1.0), mirror.to_owned()] {
+        let image = values(&frame(&scene([2, 1], i32::MAX as u32, &pinhole(80.0), &world), job.clone()));
+        assert!(image.pixels.iter().flatten().all(|&x| x == 0.0), "light from nowhere");
+    }
+}
+
+#[test]
+fn paths_that_are_made_to_end_lose_no_light() {
+    // A white box of 2³ with a black lamp of a ten thousandth of its surface. Every path ends there, one in five after more
+    // bounces than pass without roulette: radiance 1 everywhere.
+    let sphere = "Translate 0 0.5 0.5\nShape \"sphere\" \"float radius\" 0.0138\n";
+    let within = format!("AttributeBegin\n{}{}{sphere}AttributeEnd\n", diffuse(0.0), lamp(1.0));
+    let world = within + &diffuse(1.0) + &closed_box(1.0);
+    let text = scene([4, 4], i32::MAX as u32, &pinhole(80.0), &world);
+    check_mean("caught", &frame(&text, job(16, Filtering::None)), 1.0, ROUNDING);
+}
+
+#[test]
+fn a_sphere_of_light_that_is_its_own_mirror_keeps_energy() {
+    // A sphere that shines inwards and reflects half: 1 + 1/2 + 1/4 + …, though rounding puts half of its points outside.
+    for (radius, centre) in [(1.0, [0.0; 3]), (1.0, [3.0, -700.0, 0.3]), (0.013, [0.3, 0.2, 0.1])] {
+        let [x, y, z] = centre;
+        let emission = "AreaLightSource \"diffuse\" \"rgb L\" [ 1 1 1 ] \"bool twosided\" true\n";
+        let camera = format!("LookAt {x} {y} {z}  {x} {y} {}  0 1 0\n{}", z + 1.0, pinhole(80.0));
+        let world =
+            format!("{}{emission}Translate {x} {y} {z}\nShape \"sphere\" \"float radius\" {radius}\n", diffuse(0.5));
+        for techniques in [Techniques::Both, Techniques::Lights] {
+            let job = Job { techniques, ..job(64, Filtering::None) };
+            let rendered = frame(&scene([8, 8], 100, &camera, &world), job);
+            check_mean(&format!("radius {radius} at {centre:?}, {techniques:?}"), &rendered, 2.0, ROUNDING);
+        }
+    }
 }

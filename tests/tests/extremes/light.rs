@@ -318,3 +318,23 @@ fn a_lamp_in_the_plane_of_a_floor_does_not_light_it() {
         assert!(worst <= 1e6 * 1e-6);
     }
 }
+
+#[test]
+fn a_distant_light_has_its_direction_at_any_length() {
+    let lit = |end: &str| {
+        let sun = format!(
+            "LightSource \"distant\" \"rgb L\" [ 1 1 1 ] \"point3 from\" [ 0 0 -{end} ] \"point3 to\" [ 0 0 {end} ]\n"
+        );
+        picture(&scene([4, 4], 2, &pinhole(60.0), &(sun + &diffuse(0.5) + &wall())), 4, Filtering::None)
+    };
+    let expected = lit("1");
+    assert!(expected.mean()[1] > 0.1);
+    for end in ["1e-40", "1e-25", "1e19", "1e30", "1.5e38"] {
+        assert_eq!(lit(end).pixels, expected.pixels, "{end}");
+    }
+}
+
+/// Across the view, facing the camera.
+fn wall() -> String {
+    quad([[-9.0, -9.0, 3.0], [-9.0, 9.0, 3.0], [9.0, 9.0, 3.0], [9.0, -9.0, 3.0]])
+}

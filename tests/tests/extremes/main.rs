@@ -15,6 +15,7 @@ mod mesh;
 mod roughness;
 mod scale;
 mod scene;
+mod strange;
 mod support;
 mod texture;
 mod transform;

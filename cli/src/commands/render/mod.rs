@@ -50,6 +50,7 @@ fn sequence(
     if let Some(frames) = &arguments.frames {
         let outputs = iter::once(&arguments.output).chain(&arguments.channels.stats);
         outputs.into_iter().try_for_each(|output| job::distinct(output, frames.numbers()))?;
+        job::check_scenes(&arguments.scene, frames.numbers())?;
     }
     let interrupt = Interrupt::default();
     if let Err(why) = interrupt.listen() {
@@ -115,8 +116,10 @@ fn render(
     reporter.memory.check(render::least_memory(&prepared))?;
     let begun = reporter.checkpoints.begin(&prepared.description)?;
     let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
-    let stopped = reporter.hindered() && !traced.frame.complete();
-    if stopped {
+    let finished = traced.frame.complete() || reporter.goal_reached();
+    let stopped = reporter.hindered() && !finished;
+    if !finished {
+        // Whatever ends the render, a limit of time too, the same command goes on from here.
         pool.install(|| reporter.checkpoints.write(&mut traced.frame));
     }
 
@@ -134,14 +137,14 @@ fn render(
         file.write((text + "\n").as_bytes())?;
     }
     if stopped {
-        outcome::tell(&stats, &outcome.written.frame, log);
+        outcome::tell(&stats, &outcome.written.frame, &reporter);
         return Err(reporter.hindrance());
     }
-    if stats.complete {
+    if finished {
         reporter.checkpoints.clear();
     }
     progress.finish(&path, stats.memory.peak_resident_bytes);
-    outcome::tell(&stats, &outcome.written.frame, log);
+    outcome::tell(&stats, &outcome.written.frame, &reporter);
     outcome::judge(arguments, &stats)
 }
 

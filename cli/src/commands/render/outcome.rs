@@ -4,14 +4,13 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use renderer::error::{Estimate, Watch};
+use renderer::error::Estimate;
 use renderer::film::exr::Losses;
 use renderer::render::Frame;
 
 use super::reporter::Reporter;
 use crate::args::RenderArguments;
 use crate::exit::Failure;
-use crate::log::Log;
 use crate::metadata;
 use crate::stats::{self, Filter, Memory, Primitives, Problems, Rays, Seconds, Stats};
 
@@ -77,7 +76,7 @@ impl<'a> Outcome<'a> {
             },
             filter: Filter::of(statistics),
             error: error.as_ref().map(stats::Error::of),
-            goal_reached: reporter.watch.as_ref().is_some_and(Watch::reached),
+            goal_reached: reporter.goal_reached(),
             problems: Problems {
                 warnings: reporter.warnings.load(Ordering::Relaxed),
                 rejected_samples: counters.rejected_samples,
@@ -89,7 +88,8 @@ impl<'a> Outcome<'a> {
 }
 
 /// Sums up for people.
-pub fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
+pub fn tell(stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
+    let log = reporter.log;
     let [start, end] = stats.samples;
     let asked = &frame.description.asked;
     if let Some(error) = &stats.error {
@@ -99,9 +99,10 @@ pub fn tell(stats: &Stats<'_>, frame: &Frame, log: &Log) {
         log.info(&format!("good enough with {} of {} samples per pixel", end - start, asked.end - asked.start));
     } else if !stats.complete {
         log.warning(&format!(
-            "stopped early: {} of {} samples per pixel were taken",
+            "stopped early: {} of {} samples per pixel were taken{}",
             end - start,
-            asked.end - asked.start
+            asked.end - asked.start,
+            reporter.hint()
         ));
     }
     if stats.problems.rejected_samples > 0 {

@@ -127,7 +127,7 @@ impl Observer for Reporter<'_> {
     }
 
     fn stop_requested(&self) -> bool {
-        self.hindered() || self.watch.as_ref().is_some_and(Watch::reached)
+        self.hindered() || self.goal_reached()
     }
 
     fn next_look(&self) -> u64 {
@@ -145,13 +145,23 @@ impl Reporter<'_> {
         self.interrupt.requested() || self.memory.reached.load(Ordering::Relaxed)
     }
 
+    /// Whether the frame is as good as it was asked to be.
+    pub fn goal_reached(&self) -> bool {
+        self.watch.as_ref().is_some_and(Watch::reached)
+    }
+
+    /// What is to be said where samples are missing: how to go on, if anything was kept for that.
+    pub fn hint(&self) -> &'static str {
+        if self.checkpoints.wanted() { "; the same command goes on from the checkpoint" } else { "" }
+    }
+
     /// Why the render ends before its time.
     pub fn hindrance(&self) -> Failure {
+        const UP_TO_NOW: &str = "the output holds the samples up to now";
         if !self.interrupt.requested() {
-            return Failure::Render("--memory-limit is reached; the output holds the samples up to now".into());
+            return Failure::Render(format!("--memory-limit is reached; {UP_TO_NOW}"));
         }
-        let kept = if self.checkpoints.wanted() { "; the same command goes on from the checkpoint" } else { "" };
-        Failure::Interrupted(format!("interrupted; the output holds the samples up to now{kept}"))
+        Failure::Interrupted(format!("interrupted; {UP_TO_NOW}{}", self.hint()))
     }
 
     /// Writes what there is of the output.

@@ -66,7 +66,10 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
             }
             LightKind::Distant { radiance, from, to, illuminance } => {
                 let irradiance = with_total(self.sane(*radiance, span), *illuminance, 1.0);
-                let Some(wi) = light.world_from_light.vector(*from - *to).try_normalize() else {
+                let towards = light.world_from_light.vector(*from - *to);
+                // The square of a long vector is beyond all numbers of its own precision, and that of a short one nothing.
+                let at_any_length = || Some(towards.as_dvec3().try_normalize()?.as_vec3());
+                let Some(wi) = towards.try_normalize().or_else(at_any_length) else {
                     return self.without_direction(span);
                 };
                 self.infinite(Infinite::Distant { irradiance, wi }, irradiance == Rgb::ZERO)

@@ -96,7 +96,7 @@ fn point(cx: &mut Context, params: &mut Params) -> LightKind {
 fn axis(cx: &mut Context, params: &mut Params) -> Option<(Vec3, Vec3)> {
     let from = params.point3(cx, "from", Vec3::ZERO);
     let to = params.point3(cx, "to", Vec3::Z);
-    if (to - from).try_normalize().is_none() {
+    if (to.as_dvec3() - from.as_dvec3()).try_normalize().is_none() {
         cx.report.error(params.span, "\"from\" and \"to\" are the same point, so the light has no direction");
         return None;
     }
