@@ -67,7 +67,8 @@ fn slabs_of_one_surface_leak_no_more_than_the_statistics_say() {
     // lies between them they share a cell, which a share 1 − t/h of the trees and places does. Where one does they are
     // siblings, and of the difference a share 1/(1 + b)² is not believed, with b at least S/N less what chance makes of it:
     // 2.8 in the default for k = 8. With V = 10⁸/2 within and S = n (10⁴/2)², S/N is n/14; at two levels, for some cells
-    // hold both sheets and others do not. Half of either is the leak.
+    // hold both sheets and others do not. Half of either is the leak. And where pooling adds to their parent, both siblings
+    // get it: in the mean 0.4 standard errors of its mean, √(3/4 n) of the bright sheet's radiance.
     let params = Params::default();
     for spp in [4, 16, 64] {
         for thickness in THICKNESSES {
@@ -86,7 +87,8 @@ fn slabs_of_one_surface_leak_no_more_than_the_statistics_say() {
             let n = f64::from(2.0 * side * side * spp as f32);
             // 0.1: the places are 8 of all, and small groups measure their noise by all their scatter.
             let unbelieved = (1.0 + (n / 14.0 - 2.8).max(0.0)).powi(-2);
-            let bound = mixed(0.5 * mean(&shared) + unbelieved + 0.1 * f64::from(thickness <= 1.0));
+            let pooled = 0.4 * (0.75 / n).sqrt();
+            let bound = mixed(0.5 * mean(&shared) + unbelieved + pooled + 0.1 * f64::from(thickness <= 1.0));
             // Where nearly all share a cell there is nothing to ask.
             let bound = if bound < 0.9 { bound } else { f64::INFINITY };
             println!(
