@@ -41,7 +41,7 @@ impl Default for Params {
             second_trees: 1,
             leaf: 4.0,
             second_leaf: 1.0,
-            shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 5 },
+            shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 4 },
             epoch: 0,
             unit: 1.0,
         }
@@ -57,11 +57,18 @@ impl Params {
     /// there are samples enough for cells that coarse ones cannot stand in for. Against leaves of 4 and 16 footprints for any
     /// number of samples this takes 1 to 18 % off the squared error of six scenes at 16 samples and 6 to 40 % at 256, for
     /// 1.3 and 1.6 to 2.5 times the memory.
+    ///
+    /// The coarsest cells keep their number of samples: each level fewer is a fourth of the area. Well distributed samples
+    /// are less noisy than the scatter within cells says, the more so the more they are, so that levels which the shrinkage
+    /// would still use only add bias: 3 and 2 levels take 3 to 13 % off the squared error of four scenes at 64 samples and
+    /// up to a fourth at 256, against 5, but add 8 % for one at 64.
     pub fn for_samples(samples: u64) -> Self {
+        let levels = 6_u32.saturating_sub(samples.max(1).ilog2() / 2).clamp(2, 5);
         let samples = samples as f32;
         let leaf = (4.0 * (16.0 / samples).sqrt().sqrt().sqrt()).clamp(1.0, 4.0);
         let second_leaf = (256.0 / (samples * samples)).clamp(1.0, 16.0);
-        Self { leaf, second_leaf, ..Self::default() }
+        let default = Self::default();
+        Self { leaf, second_leaf, shrinkage: Shrinkage { levels, ..default.shrinkage }, ..default }
     }
 }
 

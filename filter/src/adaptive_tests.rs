@@ -237,4 +237,6 @@ fn leaves_shrink_as_samples_grow() {
     for (samples, expected) in cases {
         assert_eq!(leaves(samples), expected, "{samples}");
     }
+    let levels = [0, 4, 8, 16, 64, 256, 1024, u64::MAX].map(|samples| Params::for_samples(samples).shrinkage.levels);
+    assert_eq!(levels, [5, 5, 5, 4, 3, 2, 2, 2]);
 }

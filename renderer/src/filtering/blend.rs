@@ -215,7 +215,7 @@ impl Evidence {
 /// κ − 1 where noise cannot be seen. A bias is what more samples around do not average out, so it counts more than noise;
 /// this much buys a bias that falls to less than half of the error. Where noise can be seen κ is 1: there it would make dots
 /// of it.
-const GRAVITY: f64 = 4.0;
+const GRAVITY: f64 = 8.0;
 
 /// Squared noise that can be seen, relative to brightness, as the sum over channels: of a tenth in each.
 const SEEN: f64 = 3.0 * 0.1 * 0.1;

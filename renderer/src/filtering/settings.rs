@@ -2,7 +2,7 @@
 
 use filter::talk::{self, Eviction, Jitter, LevelOfDetail, Reading};
 
-use super::{AUTO, Blend, Filtering, Selection};
+use super::{AUTO, AUTO_LEVELS, Blend, Filtering, Selection};
 
 /// A setting that a filter does not have or does not take. The message says what it would take.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -137,7 +137,19 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("certain", params.shrinkage.certain: f64, 0, 1000),
     number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
-    number!("levels", params.shrinkage.levels: u32, 0, 16),
+    Setting {
+        key: "levels",
+        values: "auto or 0 to 16",
+        get: |all| match all.params.shrinkage.levels {
+            AUTO_LEVELS => "auto".into(),
+            levels => levels.to_string(),
+        },
+        set: |all, text| {
+            let levels = text.parse().ok().filter(|levels| (0..=16).contains(levels));
+            let value = if text == "auto" { Some(AUTO_LEVELS) } else { levels };
+            value.map(|value| all.params.shrinkage.levels = value).is_some()
+        },
+    },
     number!("doubt", blend.doubt: f32, 0, 1000),
 ];
 
@@ -325,7 +337,8 @@ impl Filtering {
             "none" => Some(Self::None),
             "talk" => Some(Self::Talk(talk, Selection::default())),
             "adaptive" => {
-                let params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
+                let mut params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
+                params.shrinkage.levels = AUTO_LEVELS;
                 Some(Self::Adaptive(params, Blend::default()))
             }
             _ => None,
@@ -442,6 +455,7 @@ mod tests {
             ("adaptive", "trees", "8", "9"),
             ("adaptive", "certain", "3.25", "-0.1"),
             ("adaptive", "levels", "0", "1.5"),
+            ("adaptive", "levels", "auto", "17"),
             ("adaptive", "leaf", "0.5", "0"),
             ("adaptive", "second_leaf", "auto", "-1"),
             ("adaptive", "epoch", "auto", "0"),
