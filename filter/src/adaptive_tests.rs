@@ -237,6 +237,23 @@ fn leaves_shrink_as_samples_grow() {
     for (samples, expected) in cases {
         assert_eq!(leaves(samples), expected, "{samples}");
     }
-    let levels = [0, 4, 8, 16, 64, 256, 1024, u64::MAX].map(|samples| Params::for_samples(samples).shrinkage.levels);
-    assert_eq!(levels, [5, 5, 5, 4, 3, 2, 2, 2]);
+}
+
+#[test]
+fn one_wide_footprint_pools_no_cells_but_its_own() {
+    let resolve = |footprint: f32| {
+        let mut filter = filter();
+        for sample in 0..4 {
+            let mut records = block(5, sample);
+            let far = &mut records[4][15];
+            far.first = Vertex::new(Vec3::splat(5.0), Vec3::Y, footprint, 99, 0);
+            far.second = Vertex::new(Vec3::splat(-5.0), Vec3::Y, footprint, 99, 0);
+            filter.begin_block(sample);
+            filter.add(&records);
+        }
+        filter.resolve()
+    };
+    let (narrow, wide) = (resolve(0.03), resolve(30.0));
+    assert_eq!(narrow[..4], wide[..4]);
+    assert_eq!(narrow[4][..15], wide[4][..15]);
 }

@@ -31,7 +31,7 @@ const LEVEL_BIAS: i32 = 1 << 14;
 impl CellKey {
     /// A cell of a level, by its coordinates in ±2²⁰.
     #[cfg(test)]
-    fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
+    pub fn new(level: i32, attributes: u64, cell: [i32; 3]) -> Self {
         let [x, y, z] = cell.map(|x| spread(x as u64));
         let level = (level + LEVEL_BIAS) as u16;
         Self(u128::from(level) << 112 | u128::from(attributes & ATTRIBUTES) << 64 | u128::from(x | y << 1 | z << 2))

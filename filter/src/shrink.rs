@@ -12,7 +12,8 @@
 //! which in turn is weighed against a share of what is believed of their parents. An edge of light is one at all levels, and
 //! goes on beside; noise does not. What exceeds noise by more than chance would is believed whatever is around: then b is at
 //! least the lower confidence bound. As deposits accumulate S grows, and with it b: w goes to 1 and the bias vanishes. The
-//! sum over siblings is kept exactly, so energy is neither lost nor made.
+//! sum over siblings is kept exactly, so energy is neither lost nor made. All this is of luminance: differences of colour
+//! alone are not seen, and stay for those who know the unfiltered image to find.
 //!
 //! **Source**: shrinkage as by James and Stein \[James61\] on unbalanced Haar details, who have w = b/(1 + b); the square is
 //! nearer to Breiman's garrote \[Breiman95\]: a difference that stands out is kept nearly whole, and doubt falls on those that
@@ -44,7 +45,7 @@ pub struct Shrinkage {
     /// Degrees of freedom from which siblings' own scatter of deposits measures V. With fewer the parent's total scatter
     /// does, which includes the differences in question and so votes for pooling.
     pub trusted: f64,
-    /// Levels above the coarsest leaf.
+    /// Levels that a cell has above the coarsest leaf in it.
     pub levels: u32,
 }
 
@@ -112,6 +113,8 @@ struct Node {
     estimate: DVec3,
     /// Whether deposits were made in it, and not in cells that it holds.
     leaf: bool,
+    /// Level of the coarsest leaf in it.
+    coarsest_leaf: i32,
     /// b of the group of siblings that it is one of.
     signal: f64,
 }
@@ -259,7 +262,7 @@ impl Room {
             let (key, mut sums) = *cell(same[0]);
             same[1..].iter().for_each(|&other| sums.merge(&cell(other).1));
             let moments = Moments::of(&sums, quantum);
-            Node { key, moments, estimate: moments.mean(), leaf: true, signal: 0.0 }
+            Node { key, moments, estimate: moments.mean(), leaf: true, coarsest_leaf: key.level(), signal: 0.0 }
         };
         self.leaves.clear();
         self.leaves.extend(self.order.chunk_by(|&a, &b| cell(a).0 == cell(b).0).map(leaf));
@@ -321,19 +324,27 @@ impl Room {
             // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
             let groups = || fine[level].chunk_by(siblings).zip(coarse[0].iter().filter(|node| !node.leaf));
             scatters.clear();
-            scatters.extend(groups().map(|(group, parent)| Scatter::new(group, parent, shrinkage.trusted)));
+            // Cells that are too coarse for what they hold are in no tree: those below are roots.
+            let pools = |parent: &Node| parent.key.level() - parent.coarsest_leaf <= shrinkage.levels as i32;
+            scatters.extend(groups().map(|(group, parent)| match pools(parent) {
+                true => Scatter::new(group, parent, shrinkage.trusted),
+                false => Scatter::default(),
+            }));
             // Parents that are siblings themselves; the coarsest are not, for their own parents are in no tree.
             let mut rest = scatters.as_mut_slice();
             let akin = |a: &Node, b: &Node| level + 2 < levels_in_all && siblings(a, b);
             for parents in coarse[0].chunk_by(akin) {
                 let count = parents.iter().filter(|node| !node.leaf).count();
                 let (family, others) = std::mem::take(&mut rest).split_at_mut(count);
-                believe(family, shrinkage.inherited * parents[0].signal, shrinkage.certain);
+                // Nothing of what is infinite is not a number, and nothing here.
+                believe(family, (shrinkage.inherited * parents[0].signal).max(0.0), shrinkage.certain);
                 rest = others;
             }
             let parents = coarse[0].iter().filter(|node| !node.leaf);
             for ((group, parent), scatter) in fine[level].chunk_by_mut(siblings).zip(parents).zip(&*scatters) {
-                shrink(group, parent, scatter.signal);
+                if pools(parent) {
+                    shrink(group, parent, scatter.signal);
+                }
             }
         }
     }
@@ -362,7 +373,10 @@ fn parents(nodes: &[Node], parents: &mut Vec<Node>) {
     for node in nodes {
         let key = node.key.parent();
         match parents.last_mut() {
-            Some(parent) if parent.key == key => parent.moments.add(&node.moments),
+            Some(parent) if parent.key == key => {
+                parent.moments.add(&node.moments);
+                parent.coarsest_leaf = parent.coarsest_leaf.max(node.coarsest_leaf);
+            }
             _ => parents.push(Node { key, leaf: false, ..*node }),
         }
     }
@@ -378,8 +392,8 @@ struct Scatter {
     between: f64,
     /// N: what noise would make of it in the mean.
     noise: f64,
-    /// Siblings that are free to differ.
-    freedom: f64,
+    /// Half the variance of what noise makes of it: Σ (k−1) V².
+    uncertainty: f64,
     /// b: what is believed of S/N − 1.
     signal: f64,
 }
@@ -401,25 +415,31 @@ impl Scatter {
         }
         let known = parent.n - siblings.len() as f64;
         let variance = if known >= trusted { within / known } else { parent.scatter() / (parent.n - 1.0) };
-        let freedom = (siblings.len() - 1) as f64;
-        Self { between, noise: freedom * variance, freedom, signal: 0.0 }
+        let noise = (siblings.len() - 1) as f64 * variance;
+        Self { between, noise, uncertainty: noise * variance, signal: 0.0 }
     }
 
     fn add(&mut self, other: &Self) {
         self.between += other.between;
         self.noise += other.noise;
-        self.freedom += other.freedom;
+        self.uncertainty += other.uncertainty;
+    }
+
+    /// Siblings that are free to differ, if all are equally noisy; else fewer, for the noisy ones decide.
+    ///
+    /// **Source**: \[Satterthwaite46\].
+    fn freedom(&self) -> f64 {
+        self.noise * (self.noise / self.uncertainty)
     }
 
     /// b, where `around` is believed around.
     fn believed(&self, around: f64, certain: f64) -> f64 {
-        if self.between == 0.0 && self.noise == 0.0 {
-            return around;
+        if self.noise == 0.0 {
+            return if self.between > 0.0 { f64::INFINITY } else { around };
         }
-        // Infinite without noise, and so is what is believed.
+        let freedom = self.freedom();
         let ratio = self.between / self.noise;
-        let standard_error = (2.0 / self.freedom).sqrt();
-        most_probable(ratio - 1.0, standard_error, around).max(ratio - limit(self.freedom, certain))
+        most_probable(ratio - 1.0, (2.0 / freedom).sqrt(), around).max(ratio - limit(freedom, certain))
     }
 }
 
@@ -443,14 +463,10 @@ fn believe(family: &mut [Scatter], around: f64, certain: f64) {
 fn shrink(siblings: &mut [Node], parent: &Node, signal: f64) {
     let mean = parent.moments.mean();
     let kept = 1.0 - (1.0 + signal).recip().powi(2);
-    // No further than to where the first channel of a child would become negative, which its parent's own shrinkage can
-    // bring about; the sum over siblings is still kept.
-    let reach = |child: &Node| {
-        let down = (mean - child.moments.mean()).max(DVec3::ZERO);
-        // Where nothing goes down the quotient is infinite or, 0 / 0, not a number, which `min` passes over.
-        (parent.estimate / down).to_array().into_iter().fold(f64::INFINITY, f64::min)
-    };
-    let weight = siblings.iter().map(reach).fold(kept, f64::min).max(0.0);
+    // A parent that was shrunk itself may be darker than its mean; differences in proportion leave no channel negative, and
+    // none without light but those of children without. 0 / 0 is not a number, which `min` passes over.
+    let reach = (parent.estimate / mean).to_array().into_iter().fold(f64::INFINITY, f64::min);
+    let weight = kept.min(reach);
     for child in siblings {
         child.estimate = (parent.estimate + weight * (child.moments.mean() - mean)).max(DVec3::ZERO);
         child.signal = signal;
@@ -462,7 +478,7 @@ mod tests {
     use super::*;
 
     fn scatter(ratio: f64, freedom: f64) -> Scatter {
-        Scatter { between: ratio * freedom, noise: freedom, freedom, signal: 0.0 }
+        Scatter { between: ratio * freedom, noise: freedom, uncertainty: freedom, signal: 0.0 }
     }
 
     #[test]
@@ -482,11 +498,40 @@ mod tests {
         assert_eq!(believed(1.0), 0.0);
         assert!(believed(4.0) > 1.0);
         // A large one is believed whatever is around; and what noise does not explain at all.
-        let mut family = [scatter(100.0, 3.0), Scatter { between: 1.0, noise: 0.0, freedom: 3.0, signal: 0.0 }];
+        let mut family = [scatter(100.0, 3.0), Scatter { between: 1.0, ..Scatter::default() }];
         believe(&mut family[..1], 0.0, 2.5);
         assert!(family[0].signal > 90.0);
         believe(&mut family[1..], 0.0, 2.5);
         assert_eq!(family[1].signal, f64::INFINITY);
+    }
+
+    #[test]
+    fn one_noisy_group_does_not_vote_for_its_family() {
+        // Its scatter is what chance would make of three numbers now and then, not of 24.
+        let mut family = [Scatter::default(); 8];
+        family[0] = scatter(4.0, 3.0);
+        let mut all = Scatter::default();
+        family.iter().for_each(|group| all.add(group));
+        assert!((all.freedom() - 3.0).abs() < 1e-12);
+        believe(&mut family, 0.0, 2.5);
+        assert_eq!(family[0].signal, 0.0);
+        // Of equally noisy ones it is.
+        assert!((Scatter { noise: 24.0, uncertainty: 24.0, ..Scatter::default() }.freedom() - 24.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_was_shrunk_keeps_light_where_it_was_found() {
+        let node = |mean: f64, estimate: f64, level| Node {
+            key: CellKey::new(level, 0, [0; 3]),
+            moments: Moments { n: 8.0, weight: 8.0, rgb: DVec3::splat(8.0 * mean), square: 8.0 * mean * mean },
+            estimate: DVec3::splat(estimate),
+            leaf: true,
+            coarsest_leaf: level,
+            signal: 0.0,
+        };
+        let mut children = [node(4.0, 4.0, 0), node(16.0, 16.0, 0)];
+        shrink(&mut children, &node(10.0, 5.0, 1), f64::INFINITY);
+        assert_eq!(children.map(|child| child.estimate.x), [2.0, 8.0]);
     }
 
     #[test]

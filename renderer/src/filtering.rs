@@ -35,9 +35,8 @@ pub enum Filtering {
 }
 
 impl Filtering {
-    /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`] and levels of [`AUTO_LEVELS`], see
-    /// [`filter::Params::for_samples`], and an epoch of 0, which becomes an eighth of the samples, a power of two and at least
-    /// [`SHORTEST_EPOCH`].
+    /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`], see [`filter::Params::for_samples`],
+    /// and an epoch of 0, which becomes an eighth of them, a power of two and at least [`SHORTEST_EPOCH`].
     ///
     /// Ranges of whole epochs are filtered alike on one machine and on several, so the epoch is the trade between how much
     /// second vertices share and how many slices a frame can be cut into. Measured against one epoch over all samples, an
@@ -49,8 +48,6 @@ impl Filtering {
             {
                 *leaf = if *leaf == AUTO { measured } else { *leaf };
             }
-            let levels = &mut params.shrinkage.levels;
-            *levels = if *levels == AUTO_LEVELS { measured.shrinkage.levels } else { *levels };
             if params.epoch == 0 {
                 params.epoch = 1 << (spp / 8).max(SHORTEST_EPOCH).ilog2();
             }
@@ -78,9 +75,6 @@ impl Filtering {
 
 /// Width of leaves that [`Filtering::settled`] decides.
 const AUTO: f32 = 0.0;
-
-/// The same for levels.
-const AUTO_LEVELS: u32 = u32::MAX;
 
 /// Shortest epoch that is chosen without being asked for, samples per pixel.
 const SHORTEST_EPOCH: u64 = 4;

@@ -255,11 +255,14 @@ fn load_cells(words: &mut Words<'_>) -> Result<Vec<(CellKey, WideSums)>, StoredE
     Ok(cells)
 }
 
-/// Reads what [`branch::store_sums`] appended.
+/// Reads what [`branch::store_sums`] appended: of cells with deposits, so that they have means.
 fn load_sums(words: &mut Words<'_>) -> Result<WideSums, StoredError> {
     let [count] = words.take()?;
     let (weighted, wide, count) = (count & 1 != 0, count & 2 != 0, count >> 2);
     let weight = if weighted { words.take::<1>()?[0] } else { WideSums::plain_weight(count).ok_or(StoredError)? };
+    if count == 0 || weight == 0 {
+        return Err(StoredError);
+    }
     let [r, g, b, square] = if wide {
         let halves = words.take::<8>()?;
         std::array::from_fn(|i| join(halves[2 * i], halves[2 * i + 1]))

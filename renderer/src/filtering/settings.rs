@@ -2,7 +2,7 @@
 
 use filter::talk::{self, Eviction, Jitter, LevelOfDetail, Reading};
 
-use super::{AUTO, AUTO_LEVELS, Blend, Filtering, Selection};
+use super::{AUTO, Blend, Filtering, Selection};
 
 /// A setting that a filter does not have or does not take. The message says what it would take.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -137,19 +137,8 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("certain", params.shrinkage.certain: f64, 0, 1000),
     number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
-    Setting {
-        key: "levels",
-        values: "auto or 0 to 16",
-        get: |all| match all.params.shrinkage.levels {
-            AUTO_LEVELS => "auto".into(),
-            levels => levels.to_string(),
-        },
-        set: |all, text| {
-            let levels = text.parse().ok().filter(|levels| (0..=16).contains(levels));
-            let value = if text == "auto" { Some(AUTO_LEVELS) } else { levels };
-            value.map(|value| all.params.shrinkage.levels = value).is_some()
-        },
-    },
+    number!("levels", params.shrinkage.levels: u32, 0, 16),
+    number!("second_levels", params.second_levels: u32, 0, 16),
     number!("doubt", blend.doubt: f32, 0, 1000),
 ];
 
@@ -337,8 +326,7 @@ impl Filtering {
             "none" => Some(Self::None),
             "talk" => Some(Self::Talk(talk, Selection::default())),
             "adaptive" => {
-                let mut params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
-                params.shrinkage.levels = AUTO_LEVELS;
+                let params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
                 Some(Self::Adaptive(params, Blend::default()))
             }
             _ => None,
@@ -455,7 +443,7 @@ mod tests {
             ("adaptive", "trees", "8", "9"),
             ("adaptive", "certain", "3.25", "-0.1"),
             ("adaptive", "levels", "0", "1.5"),
-            ("adaptive", "levels", "auto", "17"),
+            ("adaptive", "second_levels", "2", "17"),
             ("adaptive", "leaf", "0.5", "0"),
             ("adaptive", "second_leaf", "auto", "-1"),
             ("adaptive", "epoch", "auto", "0"),
