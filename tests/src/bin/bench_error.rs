@@ -11,7 +11,7 @@
 //! Errors are relative to the references' mean after a Wiener filter. Where little light is found references of thousands of
 //! samples are noisy too: dark pixels that are darker yet by chance would count for several times as much.
 //!
-//! `TESSERA_SEED` is the seed of the frames, 1 if it is not set.
+//! `TESSERA_SEED` is the seed of the frames, 1 if it is not set; `TESSERA_FILTERS` the filters, `none,adaptive`.
 //!
 //! Never a test: it only prints.
 #![forbid(unsafe_code)]
@@ -98,7 +98,9 @@ fn main() -> Result<(), Failure> {
         ..Job::default()
     };
     let references = References::new(read_exr(Path::new(a)), read_exr(Path::new(b)));
-    for filtering in ["none", "adaptive"].map(|name| Filtering::named(name).expect("a known filter")) {
+    let filters = std::env::var("TESSERA_FILTERS").unwrap_or_else(|_| "none,adaptive".to_owned());
+    for name_of_filter in filters.split(',') {
+        let filtering = Filtering::named(name_of_filter).ok_or("no such filter")?;
         for spp in spps.split(',').filter(|spp| !spp.is_empty()) {
             let spp = spp.parse()?;
             let (frame, estimate) = run(&Job { spp: Some(spp), filtering, ..job.clone() }, Goal::default())?;
