@@ -193,24 +193,24 @@ fn image() -> Vec<u8> {
 /// Counts what [`render_all`] does, and prints it.
 fn tell(size: &str, spp: &str) -> Result<(), Failure> {
     let counts = instructions(size, spp)?;
-    let Some(([room, again], variants)) = counts.split_first_chunk::<2>() else {
-        return Err("valgrind counted nothing".into());
-    };
-    let percent = |count: u64| (1e5 * (count as f64 / *room as f64 - 1.0)).round() / 1e3;
-    eprintln!("the room takes {room} instructions, the same room again {:+.3} %", percent(*again));
-    for (feature, counts) in FEATURES.iter().zip(variants.chunks_exact(2)) {
+    if counts.len() != 2 + 2 * FEATURES.len() {
+        return Err(format!("valgrind counted {} frames", counts.len()).into());
+    }
+    let percent = |count: u64| (1e5 * (count as f64 / counts[0] as f64 - 1.0)).round() / 1e3;
+    eprintln!("the room takes {} instructions, the same room again {:+.3} %", counts[0], percent(counts[1]));
+    for (feature, counts) in FEATURES.iter().zip(counts[2..].chunks_exact(2)) {
         let (unused, used) = (percent(counts[0]), percent(counts[1]));
         println!("{}", serde_json::json!({"feature": feature.name, "unused_percent": unused, "used_percent": used}));
     }
     Ok(())
 }
 
-/// Instructions of each call of [`counted`], which ends a section of callgrind's profile.
+/// Instructions of each call of [`counted`], after which callgrind writes a profile.
 fn instructions(size: &str, spp: &str) -> Result<Vec<u64>, Failure> {
     let folder = tempfile::tempdir()?;
     let profile = folder.path().join("profile");
     let output = Command::new("valgrind")
-        .args(["--tool=callgrind", "--toggle-collect=*counted*", "--dump-after=*counted*", "--combine-dumps=yes"])
+        .args(["--tool=callgrind", "--toggle-collect=*::counted", "--dump-after=*::counted"])
         .arg(format!("--callgrind-out-file={}", profile.display()))
         .arg(std::env::current_exe()?)
         .args([RENDER, size, spp])
@@ -219,7 +219,12 @@ fn instructions(size: &str, spp: &str) -> Result<Vec<u64>, Failure> {
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).into());
     }
-    let text = std::fs::read_to_string(profile)?;
-    let counts = text.lines().filter_map(|line| line.strip_prefix("summary: "));
-    Ok(counts.map(|count| count.trim().parse()).collect::<Result<_, _>>()?)
+    // Numbered from 1 in the order of the calls.
+    let sections = (1..).map(|call| profile.with_extension(call.to_string())).take_while(|section| section.exists());
+    sections.map(|section| Ok(summary(&std::fs::read_to_string(section)?)?.parse()?)).collect()
+}
+
+/// The sum that a section of a profile says.
+fn summary(section: &str) -> Result<&str, &'static str> {
+    section.lines().find_map(|line| line.strip_prefix("summary: ")).ok_or("callgrind's profile has no summary")
 }
