@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct Price {
     /// The feature, as `info` calls it.
     pub feature: String,
-    /// Percent of the room's own time, where the feature is defined but not used.
+    /// Percent of the room's own instructions, where the feature is defined but not used.
     pub unused_percent: f64,
     /// The same where it is used.
     pub used_percent: f64,
@@ -28,15 +28,15 @@ pub fn of(features: &[&str]) -> Vec<Price> {
     all().into_iter().filter(|price| features.contains(&price.feature.as_str())).collect()
 }
 
-/// What prices scatter by, percent: the largest of those of features that are not used, which costs nothing.
-pub fn noise() -> f64 {
-    all().iter().map(|price| price.unused_percent.abs()).fold(0.0, f64::max)
+/// The most that any feature costs where it is not used, percent.
+pub fn unused() -> f64 {
+    all().iter().map(|price| price.unused_percent).fold(0.0, f64::max)
 }
 
-/// `curves +12 %, quadrics less than 4 %`, of which 4 is the noise.
-pub fn in_words(prices: &[Price], noise: f64) -> String {
+/// `curves +12 %, quadrics less than 1 %`.
+pub fn in_words(prices: &[Price]) -> String {
     let words = |price: &Price| match price.used_percent {
-        percent if percent.abs() <= noise => format!("{} less than {:.0} %", price.feature, noise.ceil()),
+        percent if percent.abs() < 0.5 => format!("{} less than 1 %", price.feature),
         percent => format!("{} {percent:+.0} %", price.feature),
     };
     prices.iter().map(words).collect::<Vec<_>>().join(", ")
@@ -47,19 +47,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn features_have_prices_beyond_their_noise() {
-        let all = all();
-        assert!(all.len() >= 15, "{}", all.len());
-        // What is measured must tell something: the dearest feature costs a multiple of what noise does.
-        let dearest = all.iter().map(|price| price.used_percent).fold(0.0, f64::max);
-        assert!(noise() > 0.0 && dearest > 3.0 * noise(), "{dearest} {}", noise());
+    fn features_have_prices_and_cost_nothing_unused() {
+        assert!(all().len() >= 15, "{}", all().len());
+        assert!(unused() <= 1.0, "{}", unused());
         assert_eq!(of(&["curves", "no such feature"]).len(), 1);
     }
 
     #[test]
     fn prices_are_for_people() {
         let price = |feature: &str, used_percent| Price { feature: feature.into(), unused_percent: 0.0, used_percent };
-        let words = in_words(&[price("curves", 12.4), price("crop", 0.3), price("clamping", -1.6)], 0.6);
+        let words = in_words(&[price("curves", 12.4), price("crop", 0.3), price("clamping", -1.6)]);
         assert_eq!(words, "curves +12 %, crop less than 1 %, clamping -2 %");
     }
 }

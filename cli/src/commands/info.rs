@@ -202,8 +202,9 @@ fn text(report: &Report<'_>) -> String {
         row(
             "costs",
             &format!(
-                "{} (of tracing a small room, ci/bench-features)",
-                prices::in_words(&report.prices, prices::noise())
+                "{}; features that are not used, at most {:.1} % each (instructions of a small room, ci/bench-features)",
+                prices::in_words(&report.prices),
+                prices::unused()
             ),
         );
     }

@@ -3,7 +3,7 @@
 use glam::{Affine3A, DMat3, Mat3, Mat3A, Vec3, Vec3A};
 
 use super::local::{Local, Placed};
-use crate::math::gamma;
+use crate::math::{gamma, unit_and_inverse_length};
 
 /// A placed copy of an object: its transform, and how the ray query rounds when it takes rays into object space.
 #[derive(Clone, Debug)]
@@ -76,9 +76,8 @@ impl Instance {
         let m = abs(m);
         let rounding = gamma(4) * (m * local.p.abs() + translation.abs());
 
-        let n = self.normal_matrix * local.ng;
-        let inverse_stretch = n.length_recip();
-        let ng = n * inverse_stretch;
+        // None only where the matrix takes f32 beyond its range.
+        let (ng, inverse_stretch) = unit_and_inverse_length(self.normal_matrix * local.ng).unwrap_or((local.ng, 0.0));
         // |n|ᵀ|M⁻¹|
         let seen = abs(&self.normal_matrix) * local.ng.abs();
         let extent = Vec3A::splat((m * local.extent).element_sum());

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, Vec3A};
 
 use super::surface::{CurveSet, Mesh, PatchMesh};
 use super::{Instance, TriangleTest};
-use crate::math::{PointWithError, Ray, gamma};
+use crate::math::{PointWithError, Ray, gamma, unit, unit_and_inverse_length};
 use crate::scene::description::CurveKind;
 use crate::shape::{Shape, SurfacePoint, patch};
 
@@ -55,26 +55,12 @@ impl Placed {
     /// `ng` unit; `ns` of any length.
     #[inline]
     pub fn new(p: Vec3A, error: Vec3A, ng: Vec3A, ns: Option<Vec3A>) -> Self {
-        let (ng, ns) = match ns.and_then(unit) {
-            Some(ns) => (if ng.dot(ns) < 0.0 { -ng } else { ng }, ns),
+        let (ng, ns) = match ns.and_then(unit_and_inverse_length) {
+            Some((ns, _)) => (if ng.dot(ns) < 0.0 { -ng } else { ng }, ns),
             None => (ng, ng),
         };
         Self { point: PointWithError { p: p.into(), error: error.into() }, ng: ng.into(), ns: ns.into() }
     }
-}
-
-/// `v` normalised, also where its squared length would leave the range of `f32`; `None` for zero and non-finite.
-#[inline]
-pub(super) fn unit(v: Vec3A) -> Option<Vec3A> {
-    let squared = v.length_squared();
-    if (f32::MIN_POSITIVE..=f32::MAX).contains(&squared) { Some(v * squared.sqrt().recip()) } else { extreme_unit(v) }
-}
-
-#[cold]
-fn extreme_unit(v: Vec3A) -> Option<Vec3A> {
-    let v = v.as_dvec3();
-    let length = v.length();
-    (length > 0.0 && length.is_finite()).then(|| (v / length).as_vec3a())
 }
 
 #[inline]
@@ -87,7 +73,7 @@ pub(super) fn triangle(mesh: &Mesh, hit: &Hit, flipped: bool, test: TriangleTest
     // Barycentric coordinates, products and sums of rounded operations.
     let error = gamma(7) * (terms[0].abs() + terms[1].abs() + terms[2].abs());
     // A triangle that was hit has a normal: zero divides by zero and misses.
-    let n = unit(hit.ng.into()).unwrap_or(Vec3A::Z);
+    let n = unit_and_inverse_length(hit.ng.into()).map_or(Vec3A::Z, |(n, _)| n);
     let to = v.map(|vertex| vertex - p);
     let extent = to[0].abs().max(to[1].abs()).max(to[2].abs());
     let clearance = test.clearance(&to, extent, n, error);
@@ -104,7 +90,7 @@ pub(super) fn patch(mesh: &PatchMesh, hit: &Hit, flipped: bool) -> Local {
     let SurfacePoint { point, n, .. } = patch::surface_point(&corners, hit.u, hit.v);
     let (low, high) = patch::bounds(&corners);
     let ns = (!mesh.normals.is_empty()).then(|| mesh.interpolate(hit.primitive, &mesh.normals, hit.u, hit.v));
-    let n = if n == Vec3::ZERO { unit3(hit.ng).unwrap_or(Vec3::Z) } else { n };
+    let n = if n == Vec3::ZERO { unit(hit.ng).unwrap_or(Vec3::Z) } else { n };
     Local::of_shape(point, high - low, if flipped { -n } else { n }, ns)
 }
 
@@ -142,30 +128,26 @@ pub(super) fn curve(curves: &CurveSet, ray: &Ray, hit: &Hit, instance: Option<&I
     let ng = match curves.kind {
         CurveKind::Ribbon => {
             let n = instance.map_or(hit.ng, |instance| instance.normal(hit.ng));
-            unit3(n).unwrap_or(Vec3::Z)
+            unit(n).unwrap_or(Vec3::Z)
         }
         CurveKind::Flat => facing(tangent, ray.direction),
         CurveKind::Cylinder => {
             let flat = facing(tangent, ray.direction);
-            let side = unit3(tangent.cross(flat)).unwrap_or(Vec3::ZERO);
+            let side = unit(tangent.cross(flat)).unwrap_or(Vec3::ZERO);
             let centre = curves.segments.at(segment, hit.u);
             let origin = instance.map_or(centre.truncate(), |instance| instance.point(centre.truncate()));
             // From −1 at one edge to 1 at the other.
             let across = (p - origin).dot(side) / world(Vec3::splat(centre.w / 3.0_f32.sqrt())).length();
             let (sin, cos) = (across.clamp(-1.0, 1.0) * std::f32::consts::FRAC_PI_2).sin_cos();
-            unit3(flat * cos + side * sin).unwrap_or(flat)
+            unit(flat * cos + side * sin).unwrap_or(flat)
         }
     };
     Local::of_shape(PointWithError { p, error }, Vec3::ZERO, ng, None)
 }
 
-fn unit3(v: Vec3) -> Option<Vec3> {
-    unit(v.into()).map(Vec3::from)
-}
-
 /// The unit vector orthogonal to `tangent` that points back along `direction` as well as can be.
 fn facing(tangent: Vec3, direction: Vec3) -> Vec3 {
-    unit3(tangent.cross(direction).cross(tangent)).map_or_else(|| unit3(-direction).unwrap_or(Vec3::Z), |n| -n)
+    unit(tangent.cross(direction).cross(tangent)).map_or_else(|| unit(-direction).unwrap_or(Vec3::Z), |n| -n)
 }
 
 /// Linear interpolation over (u, v) of the values at p00, p10, p01, p11.

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::Surface;
-use crate::math::{Frame, Rgb};
+use crate::math::{Frame, Rgb, unit};
 use crate::scene::description::{TextureId, Value, Wrap};
 use crate::texture::{Pyramid, TexturePoint, Textures};
 
@@ -33,7 +33,7 @@ pub fn bump(at: &Surface, displacement: TextureId, textures: &Textures) -> (Vec3
     let tangential = |v: Vec3| v - at.ns * at.ns.dot(v);
     let dpdu = tangential(at.dpdu) + at.ns * ((beside_u - here) / du);
     let dpdv = tangential(at.dpdv) + at.ns * ((beside_v - here) / dv);
-    match dpdu.cross(dpdv).try_normalize() {
+    match unit(dpdu.cross(dpdv)) {
         Some(ns) => (towards(ns, at.ng), dpdu),
         None => (at.ns, at.dpdu),
     }
@@ -47,7 +47,7 @@ pub fn normal_map(at: &Surface, map: &Pyramid) -> Vec3 {
     let st = Vec2::new(uv.x, 1.0 - uv.y);
     let bent = 2.0 * map.bilinear(st, Wrap::Repeat) - Rgb::ONE;
     let frame = Frame::from_normal_and_tangent(at.ns, at.dpdu);
-    match (frame.s * bent.x + frame.t * bent.y + frame.n * bent.z).try_normalize() {
+    match unit(frame.s * bent.x + frame.t * bent.y + frame.n * bent.z) {
         Some(ns) => towards(ns, at.ng),
         None => at.ns,
     }

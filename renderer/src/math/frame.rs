@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::unit;
+
 /// A unit direction in the frame of a surface: `z` is along the shading normal.
 ///
 /// Made only by [`Frame::to_local`], by the warps and by reflection and refraction within the frame, so a world-space
@@ -47,6 +49,10 @@ impl LocalDir {
     }
 }
 
+/// How much of a tangent's square must be left without its part along the normal: more than rounding leaves, or its direction
+/// means nothing.
+const REST: f32 = 1e-10;
+
 /// A right-handed orthonormal frame: tangent `s`, bitangent `t`, normal `n`, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
@@ -76,14 +82,22 @@ impl Frame {
     /// A frame around the unit normal `n` whose tangent is `tangent` made orthogonal to it; any tangent if that is
     /// degenerate.
     pub fn from_normal_and_tangent(n: Vec3, tangent: Vec3) -> Self {
-        let s = tangent - n * n.dot(tangent);
-        match s.try_normalize() {
-            // What is left after the projection must be more than its rounding error for the direction to mean anything.
-            Some(unit) if s.length_squared() > 1e-10 * tangent.length_squared() => {
-                Self { s: unit, t: n.cross(unit), n }
-            }
-            _ => Self::from_normal(n),
+        let squared = tangent.length_squared();
+        if !(f32::MIN_POSITIVE / REST..=f32::MAX).contains(&squared) {
+            return Self::from_extreme_tangent(n, tangent);
         }
+        let s = tangent - n * n.dot(tangent);
+        if s.length_squared() <= REST * squared {
+            return Self::from_normal(n);
+        }
+        let s = s.normalize();
+        Self { s, t: n.cross(s), n }
+    }
+
+    /// The same where the square of the tangent, or of what is left of it, leaves the range of `f32`.
+    #[cold]
+    fn from_extreme_tangent(n: Vec3, tangent: Vec3) -> Self {
+        unit(tangent).map_or_else(|| Self::from_normal(n), |tangent| Self::from_normal_and_tangent(n, tangent))
     }
 
     /// World to local.
@@ -101,6 +115,23 @@ impl Frame {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn frames_are_orthonormal_for_tangents_of_any_length() {
+        let n = Vec3::new(0.48, -0.6, 0.64);
+        let expected = Frame::from_normal_and_tangent(n, Vec3::new(0.3, 0.5, -0.2));
+        for exponent in -45..=38 {
+            let scale = 10_f64.powi(exponent);
+            let tangent = (glam::DVec3::new(0.3, 0.5, -0.2) * scale).as_vec3();
+            let frame = Frame::from_normal_and_tangent(n, tangent);
+            assert!((frame.s.length() - 1.0).abs() < 1e-6 && frame.s.dot(n).abs() < 1e-6, "10^{exponent}: {frame:?}");
+            // Where the tangent itself has its digits, its direction is kept.
+            assert!(exponent < -37 || frame.s.distance(expected.s) < 1e-6, "10^{exponent}: {frame:?}");
+        }
+        for strange in [Vec3::ZERO, Vec3::NAN, Vec3::INFINITY] {
+            assert!((Frame::from_normal_and_tangent(n, strange).s.length() - 1.0).abs() < 1e-6);
+        }
+    }
 
     proptest! {
         #[test]

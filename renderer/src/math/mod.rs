@@ -5,6 +5,7 @@ pub mod interval;
 pub mod ray;
 pub mod rgb;
 pub mod transform;
+mod unit;
 pub mod warp;
 mod wiener;
 pub mod window;
@@ -14,5 +15,6 @@ pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;
+pub use unit::{unit, unit_and_inverse_length};
 pub use wiener::wiener;
 pub use window::{Widening, widened, windows};

@@ -69,13 +69,19 @@ impl Sphere {
         // From the point of the line nearest to the centre, half a chord either way: no difference of large squares.
         let a = d.length_squared();
         let t_nearest = -o.dot(d) / a;
-        let nearest = (o + d * t_nearest).length();
+        let middle = o + d * t_nearest;
+        let nearest = middle.length();
         let half_chord = ((self.radius - nearest) * (self.radius + nearest) / a).sqrt();
         if half_chord.is_nan() {
             return None;
         }
-        [t_nearest - half_chord, t_nearest + half_chord].into_iter().filter(|&t| in_range(t, t_range)).find_map(|t| {
-            let local = o + d * t;
+        [-half_chord, half_chord].into_iter().find_map(|half| {
+            let t = t_nearest + half;
+            if !in_range(t, t_range) {
+                return None;
+            }
+            // Not o + d·t, which is the centre or anywhere where the sphere is small beyond the digits of t.
+            let local = middle + d * half;
             self.parameters(local * (self.radius / local.length())).map(|uv| ShapeHit {
                 t: t as f32,
                 u: uv.x,
@@ -88,7 +94,7 @@ impl Sphere {
     /// The differential geometry at a point in the sphere's own space.
     pub fn surface_point(&self, local: Vec3) -> SurfacePoint {
         let local = local.as_dvec3();
-        let p = local * (self.radius / local.length());
+        let p = local.normalize_or(DVec3::Z) * self.radius;
         let rho = DVec2::new(p.x, p.y).length();
         let azimuthal = if rho > 0.0 { DVec2::new(p.x, p.y) / rho } else { DVec2::X };
         let dpdv = (azimuthal * p.z).extend(-rho) * (self.theta[1] - self.theta[0]);

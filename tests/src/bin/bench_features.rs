@@ -3,17 +3,15 @@
 //! `bench_features [WIDTHxHEIGHT [SPP]]`
 //!
 //! Each feature is added to a room of triangles twice: defined but used by nothing, which should cost nothing, and in use.
-//! The price is the number of instructions of tracing `SPP` samples of each pixel over that of the room alone. Valgrind counts
-//! them in a process of one thread, with `SPP` samples and with twice as many: what they differ by is tracing alone. Such a
-//! count is the same on a busy machine and on every run, as no time is; what it does not see is what a cache misses. Never a
-//! test: it only prints.
+//! The price is the number of instructions of tracing over that of the room alone. Valgrind counts those of [`counted`], in one
+//! process of one thread that renders every variant. Such a count is the same on a busy machine and on every run, as no time
+//! is; what it does not see is what a cache misses. Never a test: it only prints.
 #![forbid(unsafe_code)]
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 
-use std::path::PathBuf;
 use std::process::Command;
 
-use renderer::render::{Job, Unobserved, prepare, thread_pool, trace};
+use renderer::render::{Job, Prepared, Traced, Unobserved, prepare, thread_pool, trace};
 use tests::small::{PLAIN, SceneFile, room};
 
 /// A change of the room's text.
@@ -145,33 +143,44 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [first, scene, spp] = &arguments[..] {
-        if first == TRACE {
-            return trace_alone(scene.into(), spp.parse()?);
-        }
-    }
-    let text = |at: usize, otherwise: &str| arguments.get(at).map_or(otherwise.to_owned(), String::clone);
-    let (size, spp) = (text(0, "32x24"), text(1, "16").parse()?);
-    let (width, height) = size.split_once('x').ok_or("the size is WIDTHxHEIGHT")?;
+    let counts = arguments.first().is_some_and(|first| first == RENDER);
+    let text = |at: usize, otherwise: &str| {
+        arguments.get(at + usize::from(counts)).map_or(otherwise.to_owned(), String::clone)
+    };
+    let (size, spp) = (text(0, "48x36"), text(1, "16"));
+    if counts { render_all(&size, spp.parse()?) } else { tell(&size, &spp) }
+}
 
+/// The first argument of the process whose instructions are counted.
+const RENDER: &str = "render";
+
+/// Renders the room twice, to see that the count is the same, then with every feature unused and used.
+fn render_all(size: &str, spp: u64) -> Result<(), Failure> {
+    let (width, height) = size.split_once('x').ok_or("the size is WIDTHxHEIGHT")?;
     let base = room([width.parse()?, height.parse()?], 1.0, 1.0, PLAIN);
     let variant = |feature: &Feature, change: &str| match feature.at {
         WORLD => base.replacen(WORLD, &format!("{WORLD}AttributeBegin\n{change}AttributeEnd\n"), 1),
         at => base.replacen(at, change, 1),
     };
-    let image = image();
-    let count = |text: &str| instructions(&SceneFile::new(text).with("image.ppm", &image), spp);
-    let room = count(&base)? as f64;
+    let mut texts = vec![base.clone(), base.clone()];
     for feature in &FEATURES {
         assert!(base.contains(feature.at), "the room has no {}", feature.at);
-        let price = |change: &str| -> Result<f64, Failure> {
-            let percent = 100.0 * (count(&variant(feature, change))? as f64 / room - 1.0);
-            Ok((percent * 1000.0).round() / 1000.0)
-        };
-        let (unused, used) = (price(feature.unused)?, price(feature.used)?);
-        println!("{}", serde_json::json!({"feature": feature.name, "unused_percent": unused, "used_percent": used}));
+        texts.extend([feature.unused, feature.used].map(|change| variant(feature, change)));
+    }
+    let image = image();
+    let pool = thread_pool(1)?;
+    for text in texts {
+        let scene = SceneFile::new(&text).with("image.ppm", &image);
+        let job = Job { scene: scene.path(), spp: Some(spp), seed: Some(1), threads: 1, ..Job::default() };
+        pool.install(|| prepare(&job, &Unobserved).map(|prepared| drop(counted(prepared))))?;
     }
     Ok(())
+}
+
+/// What is counted: all that happens between a world and a frame.
+#[inline(never)]
+fn counted(prepared: Prepared) -> Traced {
+    trace(prepared, None, None, &Unobserved)
 }
 
 /// A square image of 64 × 64 pixels, blue enough to be normals.
@@ -181,34 +190,41 @@ fn image() -> Vec<u8> {
     bytes
 }
 
-/// The first argument of the process whose instructions are counted.
-const TRACE: &str = "trace";
-
-/// Traces `spp` samples of each pixel of a scene on one thread.
-fn trace_alone(scene: PathBuf, spp: u64) -> Result<(), Failure> {
-    let job = Job { scene, spp: Some(spp), seed: Some(1), threads: 1, ..Job::default() };
-    thread_pool(1)?.install(|| -> Result<(), Failure> {
-        trace(prepare(&job, &Unobserved)?, None, None, &Unobserved).develop();
-        Ok(())
-    })
+/// Counts what [`render_all`] does, and prints it.
+fn tell(size: &str, spp: &str) -> Result<(), Failure> {
+    let counts = instructions(size, spp)?;
+    if counts.len() != 2 + 2 * FEATURES.len() {
+        return Err(format!("valgrind counted {} frames", counts.len()).into());
+    }
+    let percent = |count: u64| (1e5 * (count as f64 / counts[0] as f64 - 1.0)).round() / 1e3;
+    eprintln!("the room takes {} instructions, the same room again {:+.3} %", counts[0], percent(counts[1]));
+    for (feature, counts) in FEATURES.iter().zip(counts[2..].chunks_exact(2)) {
+        let (unused, used) = (percent(counts[0]), percent(counts[1]));
+        println!("{}", serde_json::json!({"feature": feature.name, "unused_percent": unused, "used_percent": used}));
+    }
+    Ok(())
 }
 
-/// Instructions of tracing `spp` samples of each pixel.
-fn instructions(scene: &SceneFile, spp: u64) -> Result<u64, Failure> {
-    let (once, twice) = (process_instructions(scene, spp)?, process_instructions(scene, 2 * spp)?);
-    twice.checked_sub(once).ok_or_else(|| "more samples took fewer instructions".into())
-}
-
-/// Instructions of a process that does nothing else.
-fn process_instructions(scene: &SceneFile, spp: u64) -> Result<u64, Failure> {
+/// Instructions of each call of [`counted`], after which callgrind writes a profile.
+fn instructions(size: &str, spp: &str) -> Result<Vec<u64>, Failure> {
+    let folder = tempfile::tempdir()?;
+    let profile = folder.path().join("profile");
     let output = Command::new("valgrind")
-        .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
-        .args([std::env::current_exe()?, TRACE.into(), scene.path(), spp.to_string().into()])
+        .args(["--tool=callgrind", "--toggle-collect=*::counted", "--dump-after=*::counted"])
+        .arg(format!("--callgrind-out-file={}", profile.display()))
+        .arg(std::env::current_exe()?)
+        .args([RENDER, size, spp])
         .output()
         .map_err(|why| format!("cannot run valgrind, which counts instructions: {why}; install it"))?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    let count = said.lines().find_map(|line| line.split_once("I refs:").or(line.split_once("I   refs:")));
-    let (_, count) =
-        count.filter(|_| output.status.success()).ok_or_else(|| format!("valgrind counted nothing:\n{said}"))?;
-    Ok(count.replace(',', "").trim().parse()?)
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into());
+    }
+    // Numbered from 1 in the order of the calls.
+    let sections = (1..).map(|call| profile.with_extension(call.to_string())).take_while(|section| section.exists());
+    sections.map(|section| Ok(summary(&std::fs::read_to_string(section)?)?.parse()?)).collect()
+}
+
+/// The sum that a section of a profile says.
+fn summary(section: &str) -> Result<&str, &'static str> {
+    section.lines().find_map(|line| line.strip_prefix("summary: ")).ok_or("callgrind's profile has no summary")
 }

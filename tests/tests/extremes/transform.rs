@@ -35,6 +35,25 @@ fn singular_instances_are_refused() {
 }
 
 #[test]
+fn flat_instances_are_lit_or_refused() {
+    for axes in ["1 1 F", "1 F 1", "F 1 1", "F F 1", "F F F", "1e20 1 F"] {
+        let mut refusals = 0;
+        for exponent in 1..=39 {
+            let scale = axes.replace('F', &format!("1e-{exponent}"));
+            let text = instance(&format!("Scale {scale}\nRotate 40 1 2 3"));
+            match attempt(&SceneFile::new(&text).path(), job(4, Filtering::None)) {
+                Ok((frame, _)) => sound(&frame),
+                Err(messages) => {
+                    assert!(messages.contains("scene.pbrt:"), "{messages}");
+                    refusals += 1;
+                }
+            }
+        }
+        println!("Scale {axes}: {refusals} refused");
+    }
+}
+
+#[test]
 fn singular_shapes_are_refused() {
     for (case, transform) in [
         ("scale of 0", "Scale 1 0 1"),

@@ -13,7 +13,7 @@ use super::super::infinite::Infinite;
 use super::super::point::{Emission, Goniometric, PointLight, Projection, Spot};
 use super::super::tree::build::Candidate;
 use super::{Compiler, Loaded, candidates, luminance_f64, scaled, with_total};
-use crate::math::{Rgb, Transform};
+use crate::math::{Rgb, Transform, unit};
 use crate::scene::Span;
 use crate::scene::description::{Light, LightKind};
 
@@ -66,10 +66,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
             }
             LightKind::Distant { radiance, from, to, illuminance } => {
                 let irradiance = with_total(self.sane(*radiance, span), *illuminance, 1.0);
-                let towards = light.world_from_light.vector(*from - *to);
-                // The square of a long vector is beyond all numbers of its own precision, and that of a short one nothing.
-                let at_any_length = || Some(towards.as_dvec3().try_normalize()?.as_vec3());
-                let Some(wi) = towards.try_normalize().or_else(at_any_length) else {
+                let Some(wi) = unit(light.world_from_light.vector(*from - *to)) else {
                     return self.without_direction(span);
                 };
                 self.infinite(Infinite::Distant { irradiance, wi }, irradiance == Rgb::ZERO)
