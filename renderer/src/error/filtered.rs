@@ -37,11 +37,10 @@ impl Earlier {
 }
 
 impl Then {
-    /// Means of even and of odd samples since; those of all where weights of both signs leave nothing to divide by.
-    fn since(&self, now: &film::Pixel) -> [DVec3; 2] {
+    /// Means of even and of odd samples of those that have come since, `count` of them.
+    fn since(&self, now: &film::Pixel, count: u64) -> [DVec3; 2] {
         let half = |((sum, weight), (earlier, before)): ((DVec3, f64), (Rgb, f32))| {
-            let (since, of) = (sum - earlier.as_dvec3(), weight - f64::from(before));
-            if of > 0.0 { since / of } else { sum / weight.max(f64::MIN_POSITIVE) }
+            (sum - earlier.as_dvec3()) / film::normalisation(weight - f64::from(before), 0.5 * count as f64)
         };
         let [even, odd] = now.half_sums();
         [half((even, self.halves[0])), half((odd, self.halves[1]))]
@@ -79,8 +78,9 @@ pub(super) fn judge(film: &Film, pixels: &[Pixel], earlier: &Earlier, width: usi
     let growth = samples as f64 / earlier.samples as f64;
     let decline = Decline::new(mean(&changes).0, mean(&noise).0, growth);
     drop((changes, noise));
+    let since = samples.saturating_sub(earlier.samples).max(1);
     let unseen = film.bounds().pixels().zip(then).zip(&whole).map(|((at, then), weight)| {
-        let [even, odd] = then.since(film.pixel(at));
+        let [even, odd] = then.since(film.pixel(at), since);
         let value = then.value.as_dvec3();
         (value - even) * (value - odd) * *weight
     });
@@ -160,6 +160,15 @@ mod tests {
         // With four times the samples likewise.
         let filtered = Decline::new(0.01 * (4.0_f64.powf(0.55) - 1.0), 1.0, 4.0);
         assert!((filtered.model / 0.01 - 1.0).abs() < 1e-6, "{}", filtered.model);
+    }
+
+    #[test]
+    fn weights_that_cancel_leave_finite_halves() {
+        // Of a filter with negative lobes: what came since has a sum, but weights that leave nothing to divide it by.
+        for before in [0.0, 1.0, 2.0] {
+            let then = Then { value: Rgb::ONE, halves: [(Rgb::ONE, before); 2] };
+            assert_eq!(then.since(&film::Pixel::default(), 4), [DVec3::splat(-0.5); 2]);
+        }
     }
 
     #[test]

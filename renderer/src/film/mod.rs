@@ -15,7 +15,7 @@ mod sum;
 pub use aov::{Aov, AovSet, FilterMap, Layer, Outputs};
 pub use image::{Channel, Image};
 pub use matte::{Matte, Named};
-pub use pixel::{Pixel, Seen, Taken};
+pub use pixel::{Pixel, Seen, Taken, normalisation};
 pub use sum::{MOST_TERMS, Sum};
 
 use std::ops::Range;

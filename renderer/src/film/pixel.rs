@@ -84,8 +84,9 @@ fn weight(quanta: i64) -> f64 {
     quanta as f64 * 2f64.powi(-WEIGHT_BITS)
 }
 
-/// What a sum of `n` samples is divided by.
-fn normalisation(weight: f64, n: f64) -> f64 {
+/// What a sum of `n` samples is divided by: their weights, unless those cancel, as they may under a filter with negative
+/// lobes.
+pub fn normalisation(weight: f64, n: f64) -> f64 {
     // Half the expected sum: a smaller one has lost most of its digits to cancellation.
     if weight > 0.5 * n { weight } else { n }
 }

@@ -37,8 +37,9 @@ fn a_good_filter_is_left_alone() {
     for sigma in [1e-3, 0.1, 1.0] {
         for halves in [true, false] {
             let gain = 0.5 * sigma * sigma / error(&frame(sigma, halves, |_, _| 0.0));
-            // Of a filter without error: what chance speaks against it costs a hundredth of the noise at most.
-            assert!(gain > 100.0, "{sigma} {halves}: {gain}");
+            // Of a filter without error: what chance speaks against it costs a ninetieth of the noise at most. Where noise
+            // is not seen it counts for nine times as much.
+            assert!(gain > 90.0, "{sigma} {halves}: {gain}");
         }
     }
 }
