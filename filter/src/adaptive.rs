@@ -28,7 +28,7 @@ pub struct Params {
     /// When differences between cells are believed.
     pub shrinkage: Shrinkage,
     /// [`Shrinkage::levels`] at the second vertex. What noise is left there is averaged once more at the first vertex, but
-    /// what bias is stays: 3 instead of 5 take 17 and 25 % off the squared error of two scenes at 256 samples and change
+    /// what bias is stays: 3 instead of 5 take 17 and 31 % off the squared error of two scenes at 256 samples and change
     /// that at 16 by less than 2 %.
     pub second_levels: u32,
     /// Samples of a slot over which second vertices share; 0: all. Sums of filters that saw different epochs add up to those
