@@ -217,7 +217,7 @@ pub struct FilterArguments {
     /// Settings of the filter; one that it does not have is answered by a list of all
     #[arg(long, value_name = "KEY=VALUE,...", value_delimiter = ',', value_parser = setting)]
     pub filter_set: Vec<(String, String)>,
-    /// Weight of earlier frames in the talk's moving average over a sequence, in [0, 1)
+    /// Weight of earlier frames in a moving average over the frames of --frames, in [0, 1): with --filter talk
     #[arg(long, value_name = "ALPHA", value_parser = alpha)]
     pub temporal: Option<f32>,
 }

@@ -119,16 +119,35 @@ pub fn check_outputs(arguments: &RenderArguments) -> Result<(), Failure> {
 /// How the frame is to be filtered.
 ///
 /// # Errors
-/// Settings that the filter does not have or does not take, and what cannot be done yet.
+/// Settings that the filter does not have or does not take.
 pub fn filtering(arguments: &FilterArguments) -> Result<Filtering, Failure> {
-    if arguments.temporal.is_some() {
+    let Some(alpha) = arguments.temporal else { return filter(arguments.filter, &arguments.filter_set) };
+    if arguments.filter != FilterKind::Talk {
         return Err(Failure::Usage(
-            "--temporal averages over the frames of a sequence, and frames know nothing of each other yet: leave it out, and \
-             every frame is filtered by itself"
+            "--temporal moves the averages of --filter talk over the frames of a sequence; other filters take every frame by \
+             itself"
                 .into(),
         ));
     }
-    filter(arguments.filter, &arguments.filter_set)
+    let temporal = ("temporal".to_owned(), alpha.to_string());
+    filter(arguments.filter, &[&[temporal], &*arguments.filter_set].concat())
+}
+
+/// Makes sure that frames which follow from each other are rendered one after the other, all of them.
+///
+/// # Errors
+/// They are not.
+pub fn check_sequence(arguments: &RenderArguments, filtering: &Filtering) -> Result<(), Failure> {
+    let fail = |what: &str| {
+        Err(Failure::Usage(format!(
+            "a moving average (--temporal) goes over the frames of one command, in their order: {what}"
+        )))
+    };
+    match filtering.is_temporal() {
+        true if arguments.frames.is_none() => fail("name them with --frames"),
+        true if arguments.checkpoint.skip_existing => fail("--skip-existing would leave out what others follow from"),
+        _ => Ok(()),
+    }
 }
 
 /// A filter with settings.

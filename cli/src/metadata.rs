@@ -6,7 +6,7 @@ use oiio::Attribute;
 use renderer::error::Estimate;
 use renderer::film::{Aov, cryptomatte};
 use renderer::filtering::Filtering;
-use renderer::frame::{Accumulation, FrameDescription, Samples};
+use renderer::frame::{Accumulation, FrameDescription, Past, Samples};
 use renderer::render::Statistics;
 
 use crate::{job, stats};
@@ -31,6 +31,11 @@ pub fn of_frame(
         add_provenance(&mut attributes, statistics);
     }
     attributes
+}
+
+/// Of a frame that others follow from: the first of those that it follows from itself.
+pub fn of_past(past: &Past) -> (String, Attribute) {
+    ("tessera/averagedSince".into(), Attribute::Int(past.since()))
 }
 
 /// The metadata of an image that more samples will follow.

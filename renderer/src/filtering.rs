@@ -63,6 +63,11 @@ impl Filtering {
         }
     }
 
+    /// Whether averages move from frame to frame of a sequence, which then follow from each other.
+    pub fn is_temporal(&self) -> bool {
+        matches!(self, Self::Talk(talk::Params { temporal: Some(_), .. }, _))
+    }
+
     /// Slices of a frame begin and end at multiples of this many samples.
     pub fn epoch(&self) -> u64 {
         match self {
@@ -149,6 +154,13 @@ impl FrameFilter {
         };
         let blocks = Blocks { length: block, epoch: filtering.epoch() };
         Ok(Some(Self { sharing, coarse: unit * COARSE, blocks, room: vec![Vec::new(); film.tile_count()] }))
+    }
+
+    /// Goes on from the cells of another frame's talk.
+    pub fn follow(&mut self, earlier: Box<Talk>) {
+        if let Sharing::Talk(talk, _) = &mut self.sharing {
+            *talk = earlier;
+        }
     }
 
     /// Room for the records of a block, by tile, to be given back with [`Self::set_room`].
@@ -308,43 +320,32 @@ impl FrameFilter {
 
     /// Gives the film its filtered values, as of now.
     pub fn develop(&mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
-        let expose = expose(surroundings);
         match &mut self.sharing {
-            Sharing::Talk(talk, _) => {
-                let resolved = by_slot(film, 0, talk.resolve());
-                let value = |at| {
-                    let sum = resolved[film.index(at)];
-                    let prefix = film.layer(Layer::Prefix, at).unwrap_or_default();
-                    let sum = prefix + (sum.diffuse + sum.glossy).as_dvec3();
-                    expose((sum / film.pixel(at).normalisation()).as_vec3())
-                };
-                let values: Vec<Rgb> = film.bounds().pixels().map(value).collect();
-                film.set_filtered(&values);
-                Report::Talk(talk.report())
-            }
+            Sharing::Talk(talk, _) => talk_into(film, talk, expose(surroundings)),
             Sharing::Adaptive(adaptive, blend) => {
                 let resolved = adaptive.resolve();
                 if film.outputs().aovs.contains(Aov::FilterCell) {
                     film.set_map(FilterMap::Cell, by_slot(film, 0, adaptive.cell_sides()));
                 }
-                blend_into(film, resolved, blend, self.coarse, expose);
+                blend_into(film, resolved, blend, self.coarse, expose(surroundings));
                 Report::Adaptive(adaptive.report())
             }
         }
     }
 
-    /// The same at the end: the filter's memory is given back before it is needed for the blend.
-    pub fn finish(mut self, surroundings: &Surroundings, film: &mut Film) -> Report {
+    /// The same at the end, and the talk, whose cells the next frame of a sequence may go on from. The memory of the adaptive
+    /// filter is given back before it is needed for the blend.
+    pub fn finish(mut self, surroundings: &Surroundings, film: &mut Film) -> (Report, Option<Box<Talk>>) {
         self.room = Vec::new();
         match self.sharing {
-            Sharing::Talk(..) => self.develop(surroundings, film),
+            Sharing::Talk(talk, _) => (talk_into(film, &talk, expose(surroundings)), Some(talk)),
             Sharing::Adaptive(mut adaptive, blend) => {
                 if film.outputs().aovs.contains(Aov::FilterCell) {
                     film.set_map(FilterMap::Cell, by_slot(film, 0, adaptive.cell_sides()));
                 }
                 let (resolved, report) = adaptive.finish();
                 blend_into(film, resolved, &blend, self.coarse, expose(surroundings));
-                Report::Adaptive(report)
+                (Report::Adaptive(report), None)
             }
         }
     }
@@ -445,6 +446,20 @@ fn blended(frame: blend::Frame, blend: &Blend, coarse: f32, expose: impl Fn(Vec3
         }
     });
     (values, shares)
+}
+
+/// Gives the film what the talk's cells averaged.
+fn talk_into(film: &mut Film, talk: &Talk, expose: impl Fn(Vec3) -> Vec3) -> Report {
+    let resolved = by_slot(film, 0, talk.resolve());
+    let value = |at| {
+        let sum = resolved[film.index(at)];
+        let prefix = film.layer(Layer::Prefix, at).unwrap_or_default();
+        let sum = prefix + (sum.diffuse + sum.glossy).as_dvec3();
+        expose((sum / film.pixel(at).normalisation()).as_vec3())
+    };
+    let values: Vec<Rgb> = film.bounds().pixels().map(value).collect();
+    film.set_filtered(&values);
+    Report::Talk(talk.report())
 }
 
 /// Gives the film its filtered values from what each slot got.

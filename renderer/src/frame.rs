@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use filter::PathRecord;
-use glam::DMat4;
+use filter::talk::Talk;
+use glam::{DMat4, DVec3};
 
 use crate::film::{self, AovSet, Film, Outputs};
 use crate::filtering::{self, Filtering, FrameFilter, Surroundings};
@@ -42,6 +43,8 @@ pub struct FrameDescription {
     pub filtering: Filtering,
     /// What a filter must know of the world.
     pub surroundings: Surroundings,
+    /// What places are measured from, in the world of the scene file; not known of frames that were stored.
+    pub origin: DVec3,
     /// Camera space from world space.
     pub camera_from_world: DMat4,
     /// Screen space, normalised to [0, 1]², from world space; `None` for a camera without such a space.
@@ -180,6 +183,23 @@ pub struct Accumulation {
     pub samples: Samples,
     /// Rays, and samples that were rejected.
     pub counters: Counters,
+    /// Number of the first frame that the filter's averages know of, if it is an earlier one.
+    since: Option<i32>,
+}
+
+/// What a frame leaves to the next one of its sequence where averages move: the talk's cells.
+pub struct Past {
+    talk: Box<Talk>,
+    /// See [`FrameDescription::origin`].
+    origin: DVec3,
+    since: i32,
+}
+
+impl Past {
+    /// Number of the first frame that averages know of.
+    pub fn since(&self) -> i32 {
+        self.since
+    }
 }
 
 impl Accumulation {
@@ -191,7 +211,23 @@ impl Accumulation {
         let film = description.film();
         let filter = FrameFilter::new(&description.filtering, &description.surroundings, &film)
             .expect("the settings of a frame's filter are valid");
-        Self { description, film, filter, samples: Samples::default(), counters: Counters::default() }
+        let (samples, counters) = (Samples::default(), Counters::default());
+        Self { description, film, filter, samples, counters, since: None }
+    }
+
+    /// No sample yet, and a filter that goes on from the cells of the frame before.
+    ///
+    /// # Panics
+    /// As [`Self::new`].
+    pub fn following(description: FrameDescription, past: Past) -> Self {
+        let Past { mut talk, origin, since } = past;
+        talk.next_frame(description.surroundings.anchor.origin, origin - description.origin);
+        let mut frame = Self::new(description);
+        if let Some(filter) = &mut frame.filter {
+            filter.follow(talk);
+        }
+        frame.since = Some(since);
+        frame
     }
 
     /// Whether the samples that were asked for are there.
@@ -248,9 +284,16 @@ impl Accumulation {
         copy.finish(&description.surroundings, film);
     }
 
-    /// The same when no more samples follow: takes less memory.
-    pub fn finish(&mut self) -> Option<filtering::Report> {
-        self.filter.take().map(|filter| filter.finish(&self.description.surroundings, &mut self.film))
+    /// The same when no more samples follow: takes less memory. With it what the next frame is to go on from, if it is to.
+    pub fn finish(&mut self) -> Option<(filtering::Report, Option<Past>)> {
+        let Self { description, film, since, .. } = self;
+        let (report, talk) = self.filter.take()?.finish(&description.surroundings, film);
+        let past = talk.filter(|_| description.filtering.is_temporal()).map(|talk| Past {
+            talk,
+            origin: description.origin,
+            since: since.unwrap_or(description.number),
+        });
+        Some((report, past))
     }
 
     /// Bytes of the sums of pixels.

@@ -15,7 +15,7 @@ use crate::compile::{self, CompileError};
 use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
 use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, SettingError, Surroundings, Watching};
-use crate::frame::{Accumulation, FrameDescription, Samples};
+use crate::frame::{Accumulation, FrameDescription, Past, Samples};
 use crate::integrator::{self, AlphaTested, Counters, Ids, Opaque, Queries, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
@@ -204,6 +204,8 @@ pub struct Frame {
     pub samples: Samples,
     /// What it took.
     pub statistics: Statistics,
+    /// What the next frame of a sequence is to go on from.
+    pub past: Option<Past>,
 }
 
 impl Frame {
@@ -371,6 +373,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
             unit: 1.0,
             response: world.sensor.response,
         },
+        origin: world.origin,
         camera_from_world: description.camera.world_from_camera.inverse().matrix() * ours_from_world,
         ndc_from_world: world.camera.ndc_from_world().map(|ndc_from_ours| ndc_from_ours * ours_from_world),
         filename: description.film.filename.clone(),
@@ -451,18 +454,20 @@ impl Traced {
     /// The frame with its sums alone, where nobody looks at an image.
     pub fn undeveloped(self) -> Frame {
         let Self { frame, statistics } = self;
-        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
+        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics, past: None }
     }
 
     /// The frame's image, filtered if it is to be.
     pub fn develop(self) -> Frame {
         let Self { mut frame, mut statistics } = self;
         let start = Instant::now();
-        statistics.filter = frame.finish();
+        let (report, past) = frame.finish().unzip();
+        statistics.filter = report;
         let seconds = start.elapsed().as_secs_f64();
         statistics.filter_seconds += seconds;
         statistics.render_seconds += seconds;
-        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics }
+        let past = past.flatten();
+        Frame { film: frame.film, description: frame.description, samples: frame.samples, statistics, past }
     }
 }
 

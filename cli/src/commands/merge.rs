@@ -100,7 +100,7 @@ fn develop(
             if let Some(error) = &error {
                 log.info(&stats::Error::of(error).summary());
             }
-            let Frame { film, description, samples, statistics } = &*frame;
+            let Frame { film, description, samples, statistics, .. } = &*frame;
             let attributes = metadata::of_frame(description, samples, error.as_ref(), provenance(statistics));
             exr::write_as(film, attributes, &encoding, file.target())
         }

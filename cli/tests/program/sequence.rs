@@ -3,7 +3,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use super::{Bench, SCENE};
+use super::{Bench, SCENE, read};
 
 /// Two scenes that are not alike.
 fn bench() -> Bench {
@@ -97,4 +97,58 @@ fn job_files_are_for_the_engine() {
     assert!(mode("a/job/submit") & 0o111 != 0 && mode("a/job/render.sbatch") & 0o111 == 0);
     assert!(String::from_utf8(bytes(&bench, "a/job/merge.sbatch")).unwrap().contains("\nexec tessera merge "));
     bench.fail(&[&["farm", "openjd"], &shot[..], &["--", "--sp", "32"]].concat(), 2, &["--sp"]);
+}
+
+#[test]
+fn moving_averages_go_over_the_frames_of_a_command() {
+    let bench = Bench::new();
+    bench.write("still.pbrt", SCENE);
+    let render = |name: &str, seed: &str, more: &[&str]| {
+        let job = ["render", "still.pbrt", "--frames", "1-6", "--filter", "talk", "--spp", "4", "--seed", seed];
+        bench.succeed(&[&job[..], &["-o", &format!("{name}.#.exr")], more].concat());
+    };
+    let pixels = |name: &str| read(&bench.path(name)).pixels;
+    // In the middle of them: at edges the noise is that of pixels, which no cell averages.
+    let difference = |a: &str, b: &str| {
+        let squares = pixels(a).into_iter().zip(pixels(b)).map(|(a, b)| (a - b).powi(2));
+        let mut squares: Vec<f32> = squares.filter(|square| *square > 0.0).collect();
+        squares.sort_unstable_by(f32::total_cmp);
+        squares[squares.len() / 2]
+    };
+    for seed in ["1", "2"] {
+        render(&format!("alone{seed}"), seed, &[]);
+        render(&format!("moving{seed}"), seed, &["--temporal", "0.8", "--threads", "1"]);
+    }
+    // The first has no past, and later ones are mixed with theirs: of noise, which two seeds have each their own, Σ w² is left
+    // for weights w of 0.8⁵ and 0.2 · 0.8ᵏ, k < 5.
+    assert!(pixels("alone1.1.exr") == pixels("moving1.1.exr"));
+    let left = difference("moving1.6.exr", "moving2.6.exr") / difference("alone1.6.exr", "alone2.6.exr");
+    println!("noise of the sixth frame: {left:.3} (expected 0.21)");
+    assert!((0.1..0.4).contains(&left), "{left}");
+    let since = |name: &str| read(&bench.path(name)).attribute("tessera/averagedSince").cloned();
+    assert_eq!(since("moving1.6.exr"), Some(oiio::Attribute::Int(1)));
+    assert_eq!(since("alone1.6.exr"), None);
+    // The same bits whatever the threads, and other frames before are another average.
+    render("again", "1", &["--temporal", "0.8", "--threads", "2"]);
+    for frame in 1..=6 {
+        assert!(
+            bytes(&bench, &format!("again.{frame}.exr")) == bytes(&bench, &format!("moving1.{frame}.exr")),
+            "{frame}"
+        );
+    }
+    bench.succeed(&[
+        "render",
+        "still.pbrt",
+        "--frames",
+        "5,6",
+        "--filter",
+        "talk",
+        "--temporal",
+        "0.8",
+        "-o",
+        "late.#.exr",
+    ]);
+    assert_eq!(since("late.6.exr"), Some(oiio::Attribute::Int(5)));
+    let skip = ["render", "still.pbrt", "--frames", "1-2", "--filter", "talk", "--temporal", "0.8", "--skip-existing"];
+    bench.fail(&[&skip[..], &["-o", "moving1.#.exr"]].concat(), 2, &["--skip-existing", "--temporal"]);
 }

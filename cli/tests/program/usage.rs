@@ -46,7 +46,9 @@ fn a_wrong_setting_of_the_filter_is_answered_by_those_there_are() {
     fail(&["--filter", "talk", "--filter-set", "eviction=health"], &["reading at the end needs cells that stay"]);
     fail(&["--filter", "none", "--filter-set", "trees=3"], &["it has none"]);
     fail(&["--filter", "talk", "--temporal", "1.5"], &["--temporal", "less than 1"]);
-    fail(&["--filter", "talk", "--temporal", "0.8"], &["--temporal", "know nothing of each other"]);
+    fail(&["--filter", "talk", "--temporal", "0.8"], &["--temporal", "--frames"]);
+    fail(&["--filter", "talk", "--filter-set", "temporal=0.8"], &["--temporal", "--frames"]);
+    fail(&["--temporal", "0.8"], &["--temporal", "--filter talk"]);
 }
 
 #[test]

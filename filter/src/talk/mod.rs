@@ -44,7 +44,7 @@ pub struct Resolved {
     pub glossy: Vec3,
 }
 
-/// Counts of what the filter did.
+/// Counts of what the filter did in a frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Report {
     /// Passes so far.
@@ -103,6 +103,9 @@ pub struct Talk {
     cells: Cells,
     /// By part.
     slots: Vec<Slots>,
+    /// Of all frames: what the ages of cells are counted in.
+    passes: u32,
+    /// Of this frame.
     report: Report,
 }
 
@@ -140,7 +143,8 @@ impl Talk {
         let table = Table::new(slots, params.probes as u8, new);
         let cells = Cells::new(params, table.len());
         let (params, anchor) = (*params, *anchor);
-        Ok(Self { params, anchor, eye: anchor.origin, table, cells, slots: Vec::new(), report: Report::default() })
+        let (eye, report) = (anchor.origin, Report::default());
+        Ok(Self { params, anchor, eye, table, cells, slots: Vec::new(), passes: 0, report })
     }
 
     /// Adds a pass: paths of the whole frame, by part. A slot belongs to one part for good.
@@ -148,7 +152,8 @@ impl Talk {
     /// All paths deposit before any reads. What a pass is decides the result; the order of paths within a part does not.
     pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
         self.report.passes += 1;
-        let pass = self.report.passes;
+        self.passes += 1;
+        let pass = self.passes;
         if self.slots.len() < parts.len() {
             self.slots.resize_with(parts.len(), Slots::default);
         }
@@ -272,15 +277,15 @@ impl Talk {
             .collect()
     }
 
-    /// Begins another frame of a sequence, seen from `eye`: slots begin at nothing, cells stay, and with
-    /// [`Params::temporal`] what came together in this frame joins the moving averages.
-    pub fn next_frame(&mut self, eye: DVec3) {
+    /// Begins another frame of a sequence, seen from `eye`: slots and counts begin at nothing, cells stay, and with
+    /// [`Params::temporal`] what came together in this frame joins the moving averages. `moved` is what has come to the
+    /// coordinates of all places, the eye's among them, since the frame before.
+    pub fn next_frame(&mut self, eye: DVec3, moved: DVec3) {
         self.eye = eye;
+        self.anchor.origin += moved;
         self.cells.end_frame();
-        for slots in &mut self.slots {
-            slots.sums.clear();
-            slots.reads.clear();
-        }
+        self.slots.clear();
+        self.report = Report::default();
     }
 
     /// What was done so far.

@@ -203,8 +203,8 @@ impl Params {
             (self.temporal.is_none_or(|alpha| (0.0..1.0).contains(&alpha)), "alpha must be at least 0 and less than 1"),
             ((1..=126).contains(&patience), "the patience must be 1 to 126 passes"),
             (
-                self.reading == Reading::EveryPass || self.eviction == Eviction::Never && self.temporal.is_none(),
-                "reading at the end needs cells that stay: no eviction, and no moving average",
+                self.reading == Reading::EveryPass || self.eviction == Eviction::Never,
+                "reading at the end needs cells that stay: no eviction",
             ),
             (positive(self.unit) && self.unit.is_normal(), "the unit of radiance must be positive"),
         ];
@@ -253,7 +253,7 @@ mod tests {
             Params { temporal: Some(1.0), ..ok },
             Params { eviction: Eviction::LeastRecent { patience: 0 }, ..ok },
             Params { eviction: Eviction::Health { patience: 127 }, ..ok },
-            Params { reading: Reading::AtTheEnd, temporal: Some(0.5), ..ok },
+            Params { reading: Reading::AtTheEnd, eviction: Eviction::LeastRecent { patience: 1 }, ..ok },
             Params { unit: 0.0, ..ok },
         ];
         for params in bad {

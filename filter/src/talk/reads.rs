@@ -38,11 +38,6 @@ impl Reads {
         })
     }
 
-    /// Forgets all.
-    pub fn clear(&mut self) {
-        *self = Self::default();
-    }
-
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.0

@@ -245,6 +245,16 @@ const TALK: &[Setting<TalkSettings>] = &[
     positive!("table_size", params.table_size: f32),
     number!("verification_bits", params.verification_bits: u32, 1, 57),
     Setting {
+        key: "temporal",
+        values: "none, or 0 to less than 1",
+        get: |all| all.params.temporal.map_or("none".into(), |alpha| alpha.to_string()),
+        set: |all, text| {
+            let alpha = text.parse().ok().filter(|alpha| (0.0..1.0).contains(alpha));
+            all.params.temporal = alpha;
+            alpha.is_some() || text == "none"
+        },
+    },
+    Setting {
         key: "reading",
         values: "every-pass or at-the-end",
         get: |all| if all.params.reading == Reading::EveryPass { "every-pass" } else { "at-the-end" }.into(),

@@ -114,6 +114,7 @@ impl Header {
                 unit: self.unit,
                 response: Mat3::from_cols_array(&self.response),
             },
+            origin: DVec3::ZERO,
             camera_from_world: DMat4::from_cols_array(&self.camera_from_world),
             ndc_from_world: self.ndc_from_world.map(|matrix| DMat4::from_cols_array(&matrix)),
             filename: self.filename.clone(),

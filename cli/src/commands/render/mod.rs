@@ -13,7 +13,7 @@ use renderer::error::{Goal, Watch};
 use renderer::film::exr::{self, Losses};
 use renderer::film::{Aov, AovSet};
 use renderer::filtering::Filtering;
-use renderer::frame::{FrameDescription, Samples};
+use renderer::frame::{Accumulation, FrameDescription, Past, Samples};
 use renderer::part::{self, Part};
 use renderer::render::{self, Job, Traced};
 
@@ -40,7 +40,7 @@ pub fn run(arguments: &RenderArguments, log: &Log) -> Result<(), Failure> {
     sequence(arguments, &frames, log, &progress).inspect_err(|failure| progress.fail(failure))
 }
 
-/// Frames one after the other, each as if it were alone.
+/// Frames one after the other, each as if it were alone unless averages move from one to the next.
 fn sequence(
     arguments: &RenderArguments,
     frames: &[Option<i32>],
@@ -56,6 +56,7 @@ fn sequence(
     if let Err(why) = interrupt.listen() {
         log.warning(&format!("signals will end the render without an image: {why}"));
     }
+    let mut past = None;
     for &frame in frames {
         if interrupt.requested() {
             return Err(Failure::Interrupted("interrupted between two frames".into()));
@@ -63,21 +64,24 @@ fn sequence(
         let mut arguments = arguments.clone();
         arguments.frame = frame;
         arguments.scene = frame.map_or(arguments.scene.clone(), |frame| job::named(&arguments.scene, frame));
-        render(&arguments, log, progress, &interrupt)?;
+        past = render(&arguments, past, log, progress, &interrupt)?;
     }
     Ok(())
 }
 
+/// Renders a frame, on from what the one before it left, and returns what it leaves itself.
 fn render(
     arguments: &RenderArguments,
+    past: Option<Past>,
     log: &Log,
     progress: &Progress<'_>,
     interrupt: &Interrupt,
-) -> Result<(), Failure> {
+) -> Result<Option<Past>, Failure> {
     let begin = Instant::now();
     job::check_samples(arguments)?;
     job::check_outputs(arguments)?;
     let filtering = job::filtering(&arguments.filter)?;
+    job::check_sequence(arguments, &filtering)?;
     let path = job::output(arguments)?;
     let named = |path: &Path| job::named(path, arguments.frame.unwrap_or(1));
     let checkpoint = arguments.checkpoint.checkpoint.as_deref().map(named);
@@ -110,11 +114,13 @@ fn render(
     if arguments.checkpoint.skip_existing && is_complete(&path, &prepared.description) {
         log.info(&format!("{} is there and complete: nothing to do", path.display()));
         progress.finish(&path, stats::peak_memory());
-        return Ok(());
+        return Ok(None);
     }
     render::check_memory(&prepared).map_err(|error| reporter.failure(error))?;
     reporter.memory.check(render::least_memory(&prepared))?;
-    let begun = reporter.checkpoints.begin(&prepared.description)?;
+    let stored = reporter.checkpoints.begin(&prepared.description)?;
+    let followed = past.map(|past| Accumulation::following(prepared.description.clone(), past));
+    let begun = stored.or(followed);
     let mut traced = pool.install(|| render::trace(prepared, begun, job.time_limit, &reporter));
     let finished = traced.frame.complete() || reporter.goal_reached();
     let stopped = reporter.hindered() && !finished;
@@ -125,11 +131,12 @@ fn render(
 
     progress.phase("write");
     let start = Instant::now();
-    let written = if job::is_part(&path) {
+    let mut written = if job::is_part(&path) {
         write_part(traced, &pool, &output)?
     } else {
         write_image(traced, &pool, &reporter, arguments.channels.provenance)?
     };
+    let past = written.frame.past.take();
     let outcome = Outcome { path: &path, written, begin, write_seconds: start.elapsed().as_secs_f64() };
     let stats = outcome.stats(arguments, &reporter);
     if let Some(file) = stats_file {
@@ -145,7 +152,8 @@ fn render(
     }
     progress.finish(&path, stats.memory.peak_resident_bytes);
     outcome::tell(&stats, &outcome.written.frame, &reporter);
-    outcome::judge(arguments, &stats)
+    outcome::judge(arguments, &stats)?;
+    Ok(past)
 }
 
 /// Writes the sums.
@@ -170,7 +178,8 @@ fn write_image(
     let mut frame = pool.install(|| traced.develop());
     let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
     let provenance = provenance.then_some(&frame.statistics);
-    let attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
+    let mut attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
+    attributes.extend(frame.past.as_ref().map(metadata::of_past));
     let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     Ok(Written { frame, losses, error })

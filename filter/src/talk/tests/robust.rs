@@ -25,7 +25,7 @@ fn all_knobs() -> Vec<Params> {
 fn run(params: &Params, anchor: &Anchor, passes: &[Vec<Vec<PathRecord>>]) -> (Vec<(u32, [u32; 6])>, String) {
     let mut talk = Talk::new(params, anchor, passes[0].iter().map(Vec::len).sum()).unwrap();
     talk.add(&passes[0]);
-    talk.next_frame(anchor.origin);
+    talk.next_frame(anchor.origin, DVec3::ZERO);
     talk.add(&passes[1]);
     talk.add(&passes[2]);
     let bits =
@@ -179,8 +179,8 @@ fn passes_accumulate_and_slots_sum() {
         }
         assert_eq!(talk.resolve(), [[(7, Resolved { diffuse: Vec3::splat(expected), glossy: Vec3::ZERO })]]);
         // Another frame of the same: slots begin again, cells do not.
-        talk.next_frame(DVec3::ZERO);
-        assert_eq!(talk.resolve(), [[]]);
+        talk.next_frame(DVec3::ZERO, DVec3::ZERO);
+        assert!(talk.resolve().concat().is_empty());
         talk.add(&pass(7.0));
         assert_eq!(talk.resolve()[0][0].1.diffuse.x, 4.0);
     }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::support::*;
 use crate::record::PathRecord;
-use crate::talk::{Eviction, Jitter, Params, Talk};
+use crate::talk::{Eviction, Jitter, Params, Reading, Talk};
 
 fn still() -> Params {
     Params { jitter: Jitter::None, normal_jitter: 0.0, ..Params::default() }
@@ -27,7 +27,7 @@ fn a_moving_average_answers_a_step_as_powers_of_alpha() {
         assert_eq!(value(&talk), 1.0);
         let mut to_10_percent = None;
         for frame in 1..=20 {
-            talk.next_frame(ANCHOR.origin);
+            talk.next_frame(ANCHOR.origin, DVec3::ZERO);
             talk.add(&one(0.0));
             let expected = alpha.powi(frame);
             assert!((value(&talk) - expected).abs() < 1e-5, "{} in frame {frame}, not {expected}", value(&talk));
@@ -44,7 +44,7 @@ fn a_moving_average_answers_a_step_as_powers_of_alpha() {
 fn passes_of_one_frame_count_alike_in_a_moving_average() {
     let mut talk = Talk::new(&Params { temporal: Some(0.75), ..still() }, &ANCHOR, 16).unwrap();
     talk.add(&one(8.0));
-    talk.next_frame(ANCHOR.origin);
+    talk.next_frame(ANCHOR.origin, DVec3::ZERO);
     talk.add(&one(1.0));
     talk.add(&one(3.0));
     // Read after each pass: of 8 and 1, then of 8 and the mean of 1 and 3.
@@ -52,14 +52,38 @@ fn passes_of_one_frame_count_alike_in_a_moving_average() {
 }
 
 #[test]
+fn reading_at_the_end_all_paths_of_a_frame_read_the_same_moving_average() {
+    let params = Params { temporal: Some(0.75), reading: Reading::AtTheEnd, ..still() };
+    let mut talk = Talk::new(&params, &ANCHOR, 16).unwrap();
+    talk.add(&one(8.0));
+    talk.next_frame(ANCHOR.origin, DVec3::ZERO);
+    talk.add(&one(1.0));
+    talk.add(&one(3.0));
+    assert_eq!(value(&talk), 2.0 * (0.75 * 8.0 + 0.25 * 2.0));
+    let report = talk.report();
+    assert_eq!((report.passes, report.paths), (2, 2));
+}
+
+#[test]
+fn places_that_are_measured_from_elsewhere_keep_their_cells() {
+    let mut talk = Talk::new(&Params { temporal: Some(0.5), ..still() }, &ANCHOR, 16).unwrap();
+    talk.add(&one(4.0));
+    let moved = DVec3::new(-1024.0, 17.0, 3.5);
+    talk.next_frame(ANCHOR.origin + moved, moved);
+    talk.add(&[vec![diffuse(0, moved.as_vec3(), Vec3::Z, 2.0)]]);
+    assert_eq!(value(&talk), 3.0);
+    assert_eq!(talk.report().cells, 1);
+}
+
+#[test]
 fn cells_that_no_path_meets_keep_their_average_and_a_moving_eye_keeps_its_cells() {
     let mut talk = Talk::new(&Params { temporal: Some(0.5), ..still() }, &ANCHOR, 16).unwrap();
     talk.add(&one(4.0));
     for step in 1..4 {
-        talk.next_frame(ANCHOR.origin + DVec3::X * 0.25 * f64::from(step));
+        talk.next_frame(ANCHOR.origin + DVec3::X * 0.25 * f64::from(step), DVec3::ZERO);
         talk.add(&[vec![diffuse(1, Vec3::X * 3.0, Vec3::Z, 1.0)]]);
     }
-    talk.next_frame(ANCHOR.origin + DVec3::X);
+    talk.next_frame(ANCHOR.origin + DVec3::X, DVec3::ZERO);
     talk.add(&one(2.0));
     assert_eq!(value(&talk), 3.0);
     assert_eq!(talk.report().cells, 2);
@@ -90,7 +114,7 @@ fn contested(eviction: Eviction, copies: u32) -> Talk {
 
 /// How many places of a group still have the averages of their first pass, where radiance was 1, when 2 comes.
 fn kept(mut talk: Talk, group: u32, count: u32) -> usize {
-    talk.next_frame(ANCHOR.origin);
+    talk.next_frame(ANCHOR.origin, DVec3::ZERO);
     talk.add(&[places(group, count, 1, 2.0)]);
     talk.resolve()[0].iter().filter(|(_, resolved)| resolved.diffuse.x < 2.0).count()
 }
@@ -113,7 +137,7 @@ fn what_was_used_lately_stays_and_what_was_not_gives_way() {
     assert_eq!(kept(least_recent, 2, 20), 0);
     // Of what was in use all stayed: sums hold all passes.
     let mut in_use = contested(Eviction::LeastRecent { patience: 1 }, 1);
-    in_use.next_frame(ANCHOR.origin);
+    in_use.next_frame(ANCHOR.origin, DVec3::ZERO);
     in_use.add(&[places(1, 20, 1, 9.0)]);
     let expected = (1.0 + 4.0 * 2.0 + 3.0 + 9.0) / 7.0;
     assert!(in_use.resolve()[0].iter().all(|(_, resolved)| resolved.diffuse.x == expected));
