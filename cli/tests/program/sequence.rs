@@ -119,12 +119,12 @@ fn moving_averages_go_over_the_frames_of_a_command() {
         render(&format!("alone{seed}"), seed, &[]);
         render(&format!("moving{seed}"), seed, &["--temporal", "0.8", "--threads", "1"]);
     }
-    // The first has no past, and later ones are mixed with theirs: of noise, which two seeds have each their own, Σ w² is left
-    // for weights w of 0.8⁵ and 0.2 · 0.8ᵏ, k < 5.
+    // The first has no past, and later ones are mixed with theirs: of cells' noise, which two seeds have each their own, Σ w² =
+    // 0.21 is left for weights w of 0.8⁵ and 0.2 · 0.8ᵏ, k < 5; and all of the dither, as paths read cells at random.
     assert!(pixels("alone1.1.exr") == pixels("moving1.1.exr"));
     let left = difference("moving1.6.exr", "moving2.6.exr") / difference("alone1.6.exr", "alone2.6.exr");
-    println!("noise of the sixth frame: {left:.3} (expected 0.21)");
-    assert!((0.1..0.4).contains(&left), "{left}");
+    println!("noise of the sixth frame: {left:.3} (0.21 and dither)");
+    assert!((0.1..0.6).contains(&left), "{left}");
     let since = |name: &str| read(&bench.path(name)).attribute("tessera/averagedSince").cloned();
     assert_eq!(since("moving1.6.exr"), Some(oiio::Attribute::Int(1)));
     assert_eq!(since("alone1.6.exr"), None);
