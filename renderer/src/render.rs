@@ -16,7 +16,7 @@ use crate::film::cryptomatte::id;
 use crate::film::{self, AovSet, Film, Seen, Taken, Tile};
 use crate::filtering::{self, Filtering, FrameFilter, Keep, Keeper, Nothing, SettingError, Surroundings, Watching};
 use crate::frame::{Accumulation, FrameDescription, Past, Samples};
-use crate::integrator::{self, AlphaTested, Counters, Ids, Opaque, Queries, Sample, Unrecorded};
+use crate::integrator::{self, AlphaTested, Counters, Ids, Opaque, Path, Queries, Recorder, Sample, Unrecorded};
 use crate::sampling::{Dimension, Sampler};
 use crate::scene::{self, Diagnostic};
 use crate::world::{Techniques, World};
@@ -603,9 +603,9 @@ fn unit<Q: Queries>(world: &World, queries: &Q, seed: u64) -> f32 {
         let numbers = sampler.pixel_sample(pixel, u64::MAX - k);
         let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
         let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
-        let counters = &mut Counters::default();
-        let sample = integrator::trace(world, queries, &camera, &numbers, false, &mut Unrecorded, counters);
-        let radiance = f64::from(sample.radiance.element_sum() / 3.0);
+        let mut path = Path::new(&camera, numbers, Unrecorded);
+        integrator::trace(world, queries, std::iter::once(&mut path), false, &mut Counters::default());
+        let radiance = f64::from(path.end().0.radiance.element_sum() / 3.0);
         if radiance > 0.0 && radiance.is_finite() {
             sum += radiance;
             lit += 1.0;
@@ -628,37 +628,74 @@ pub fn trace_tile<Q: Queries, K: Keeper>(
     keeper: &mut K,
 ) -> Counters {
     let mut counters = Counters::default();
-    tile.for_each(|mut pixel| {
-        let [x, y] = world.sensor.in_frame(pixel.at);
-        for index in pass.clone() {
-            let numbers = sampler.pixel_sample([x as u32, y as u32], index);
-            let offset = world.filter.sample(numbers.d2(Dimension::FILM));
-            let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
-            let mut recorder = keeper.recorder();
-            let camera = world.camera.ray(film_point, numbers.d2(Dimension::LENS));
-            let sample = camera.map_or_else(Sample::default, |camera| {
-                integrator::trace(world, queries, &camera, &numbers, first_hit, &mut recorder, &mut counters)
-            });
-            if camera.is_none() {
-                counters.camera_rays += 1;
-            }
-            let mut found = sample.radiance;
-            let (mut radiance, mut exposure) = world.sensor.expose(found);
-            // A sensor's response may leave its gamut: negative is rejected only as radiance.
-            if !radiance.is_finite() || found.min_element() < 0.0 {
-                counters.rejected_samples += 1;
-                (found, radiance, exposure) = (glam::Vec3::ZERO, glam::Vec3::ZERO, 0.0);
-                recorder = keeper.recorder();
-            }
-            let weight = offset.weight;
-            let kept = Keep { slot: pixel.index, index, radiance: found, weight: weight * exposure };
-            let prefix = keeper.keep(&recorder, kept) * exposure;
-            let film_from_scene = world.sensor.response * exposure;
-            let seen = keeper.aside(&recorder).map(|aside| Seen { aside, film_from_scene });
-            pixel.add(&Taken { index, radiance, alpha: sample.alpha, weight, prefix, first: &sample.first, seen });
+    let mut samples = tile.numbers().flat_map(|pixel| pass.clone().map(move |index| (pixel, index)));
+    let mut begun = Vec::with_capacity(ABREAST);
+    loop {
+        let next = samples.by_ref().take(ABREAST);
+        begun.extend(next.map(|(pixel, index)| Begun::new(world, sampler, pixel, tile.at(pixel), index, keeper)));
+        if begun.is_empty() {
+            return counters;
         }
-    });
-    counters
+        counters.camera_rays += begun.len() as u64;
+        let paths = begun.iter_mut().filter_map(|begun| begun.path.as_mut());
+        integrator::trace(world, queries, paths, first_hit, &mut counters);
+        begun.drain(..).for_each(|begun| begun.add(world, tile, keeper, &mut counters));
+    }
+}
+
+/// Paths that a thread traces side by side: enough that a stage of all of them is worth fetching its code for, and few
+/// enough that they stay in the first caches.
+const ABREAST: usize = 16;
+
+/// A sample that is being taken.
+struct Begun<'w, R> {
+    /// The pixel's number in its tile.
+    pixel: u32,
+    /// The sample's number in the pixel.
+    index: u64,
+    /// Of the pixel filter.
+    weight: f32,
+    /// `None`: the camera sees nothing there.
+    path: Option<Path<'w, R>>,
+}
+
+impl<'w, R: Recorder> Begun<'w, R> {
+    fn new<K: Keeper<Recorder = R>>(
+        world: &World,
+        sampler: &Sampler,
+        pixel: u32,
+        at: [u32; 2],
+        index: u64,
+        keeper: &K,
+    ) -> Self {
+        let [x, y] = world.sensor.in_frame(at);
+        let numbers = sampler.pixel_sample([x as u32, y as u32], index);
+        let offset = world.filter.sample(numbers.d2(Dimension::FILM));
+        let film_point = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) + offset.offset;
+        let camera = world.camera.ray(film_point, numbers.d2(Dimension::LENS));
+        let path = camera.map(|camera| Path::new(&camera, numbers, keeper.recorder()));
+        Self { pixel, index, weight: offset.weight, path }
+    }
+
+    /// Adds what the path has brought to its pixel.
+    fn add<K: Keeper<Recorder = R>>(self, world: &World, tile: &mut Tile<'_>, keeper: &mut K, counters: &mut Counters) {
+        let Self { pixel, index, weight, path } = self;
+        let mut pixel = tile.pixel(pixel);
+        let (sample, mut recorder) = path.map_or_else(|| (Sample::default(), keeper.recorder()), Path::end);
+        let mut found = sample.radiance;
+        let (mut radiance, mut exposure) = world.sensor.expose(found);
+        // A sensor's response may leave its gamut: negative is rejected only as radiance.
+        if !radiance.is_finite() || found.min_element() < 0.0 {
+            counters.rejected_samples += 1;
+            (found, radiance, exposure) = (glam::Vec3::ZERO, glam::Vec3::ZERO, 0.0);
+            recorder = keeper.recorder();
+        }
+        let kept = Keep { slot: pixel.index, index, radiance: found, weight: weight * exposure };
+        let prefix = keeper.keep(&recorder, kept) * exposure;
+        let film_from_scene = world.sensor.response * exposure;
+        let seen = keeper.aside(&recorder).map(|aside| Seen { aside, film_from_scene });
+        pixel.add(&Taken { index, radiance, alpha: sample.alpha, weight, prefix, first: &sample.first, seen });
+    }
 }
 
 /// Counts camera rays over all threads and tells the observer, seldom enough that counting costs nothing.

@@ -104,17 +104,41 @@ impl TilePixel<'_> {
 impl Tile<'_> {
     /// Calls `visit` for each pixel of the tile that is within the film.
     pub fn for_each(&mut self, mut visit: impl FnMut(TilePixel<'_>)) {
-        let (layers, named) = (self.layers, self.named);
-        let mut sums = self.sums.chunks_exact_mut(layers.len().max(1));
-        let mut mattes = self.mattes.chunks_exact_mut(named.len().max(1));
-        for (offset, pixel) in (0..).zip(self.pixels.iter_mut()) {
-            let (sums, mattes) = (sums.next().unwrap_or_default(), mattes.next().unwrap_or_default());
-            let at = [self.origin[0] + offset % TILE, self.origin[1] + offset / TILE];
-            if at[0] < self.bounds.max[0] && at[1] < self.bounds.max[1] {
-                visit(TilePixel { at, index: self.first + offset, pixel, layers, sums, named, mattes });
-            }
+        self.numbers().for_each(|number| visit(self.pixel(number)));
+    }
+
+    /// The numbers of the tile's pixels that are within the film.
+    pub fn numbers(&self) -> impl Iterator<Item = u32> + use<> {
+        let (origin, end) = (self.origin, self.bounds.max);
+        (0..self.pixels.len() as u32).filter(move |&number| {
+            let [x, y] = place(origin, number);
+            x < end[0] && y < end[1]
+        })
+    }
+
+    /// Column and row in the frame of the pixel of this number.
+    pub fn at(&self, number: u32) -> [u32; 2] {
+        place(self.origin, number)
+    }
+
+    /// The pixel of this number.
+    pub fn pixel(&mut self, number: u32) -> TilePixel<'_> {
+        let (i, layers, named) = (number as usize, self.layers.len(), self.named.len());
+        TilePixel {
+            at: place(self.origin, number),
+            index: self.first + number,
+            pixel: &mut self.pixels[i],
+            layers: self.layers,
+            sums: &mut self.sums[i * layers..][..layers],
+            named: self.named,
+            mattes: &mut self.mattes[i * named..][..named],
         }
     }
+}
+
+/// Column and row of a pixel by its number in the tile that begins at `origin`.
+fn place(origin: [u32; 2], number: u32) -> [u32; 2] {
+    [origin[0] + number % TILE, origin[1] + number / TILE]
 }
 
 impl Tile<'_> {

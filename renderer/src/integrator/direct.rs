@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 
-use super::{Counters, Queries};
 use crate::interaction::SurfaceInteraction;
 use crate::light::{Group, Receiver, Target, power_heuristic};
 use crate::material::Shading;
-use crate::math::{LocalDir, PointWithError, Rgb, spawn_ray, spawn_segment};
+use crate::math::{LocalDir, PointWithError, Ray, Rgb, spawn_ray, spawn_segment};
 use crate::sampling::{Use, VertexNumbers};
 use crate::world::{Techniques, World};
 
@@ -81,14 +80,9 @@ pub struct DirectLight {
     pub group: Group,
 }
 
-/// Samples a light for `vertex`. `None`: no light arrives that the BSDF would send along `wo`.
-pub fn sample<Q: Queries>(
-    world: &World,
-    queries: &Q,
-    vertex: &Vertex<'_>,
-    numbers: &VertexNumbers,
-    counters: &mut Counters,
-) -> Option<DirectLight> {
+/// Samples a light for `vertex`: what it brings if nothing is on the ray. `None`: no light that the BSDF would send along
+/// `wo`.
+pub fn sample(world: &World, vertex: &Vertex<'_>, numbers: &VertexNumbers) -> Option<(DirectLight, Ray)> {
     let (u_select, u) = (numbers.d1(Use::LightSelect), numbers.d2(Use::Light));
     let light = world.lights.sample(&vertex.receiver(), u_select, u)?;
     let wi = vertex.shading.frame.to_local(light.wi);
@@ -102,14 +96,11 @@ pub fn sample<Q: Queries>(
         Target::Point(p) => spawn_segment(point, ng, PointWithError::exact(p), Vec3::ZERO),
         Target::Infinite => spawn_ray(point, ng, light.wi),
     };
-    counters.shadow_rays += 1;
-    if queries.occluded(&segment) {
-        return None;
-    }
     let weight = match world.techniques {
         Techniques::Both if !light.delta => power_heuristic(light.pdf, bsdf_pdf),
         Techniques::Bsdfs if !light.delta => 0.0,
         _ => 1.0,
     };
-    Some(DirectLight { wi, f, incident: light.radiance * (weight / light.pdf), group: light.group })
+    let incident = light.radiance * (weight / light.pdf);
+    Some((DirectLight { wi, f, incident, group: light.group }, segment))
 }

@@ -9,7 +9,7 @@ mod recorder;
 mod roulette;
 
 pub use aside::{Aside, Feature, Ids, Scattered};
-pub use path::trace;
+pub use path::{Path, trace};
 pub use queries::{AlphaTested, Opaque, Queries, Recorded, Recording};
 pub use record::{FirstHit, Sample};
 pub use recorder::{Cut, Recorder, Unrecorded};

@@ -1,88 +1,157 @@
 //! The path loop.
 
+use embree::Hit;
 use glam::Vec3;
 
 use super::direct::{self, DirectLight, Scatter, Vertex};
 use super::{Counters, FirstHit, Queries, Recorder, Sample, roulette};
 use crate::bsdf::BsdfSample;
 use crate::camera::CameraRay;
+use crate::interaction::SurfaceInteraction;
 use crate::light::Group;
-use crate::math::{Ray, Rgb, spawn_ray};
-use crate::sampling::{Dimension, Numbers, Use};
+use crate::material::Shading;
+use crate::math::{LocalDir, Ray, Rgb, spawn_ray};
+use crate::sampling::{Dimension, Numbers, Use, VertexNumbers};
 use crate::world::World;
 
-/// Radiance along one camera ray, by unidirectional path tracing with a light sample at every vertex.
+/// Traces paths from their camera rays to their ends, by unidirectional path tracing with a light sample at every vertex.
 ///
 /// Both ways to reach a light, by sampling the light and by sampling the BSDF, are weighted by the power heuristic.
-/// `first_hit` asks for the auxiliary values of the first hit; `recorder` sees all that happens. The result is a pure
-/// function of the world, the camera ray and the numbers.
+/// `first_hit` asks for the auxiliary values of the first hit. What becomes of a path is a pure function of the world, its
+/// camera ray and its numbers.
+///
+/// The paths go side by side, a stage of all of them before the next one: a path by itself would need more code from vertex
+/// to vertex than the first cache holds, and fetch it again for every ray.
 ///
 /// **Source**: \[Kajiya86\]; \[Veach97\] chapter 9 for the weights.
-pub fn trace<Q: Queries, R: Recorder>(
-    world: &World,
+pub fn trace<'p, 'w: 'p, Q: Queries, R: Recorder + 'p>(
+    world: &'w World,
     queries: &Q,
-    camera: &CameraRay,
-    numbers: &Numbers,
+    paths: impl Iterator<Item = &'p mut Path<'w, R>>,
     first_hit: bool,
-    recorder: &mut R,
     counters: &mut Counters,
-) -> Sample {
-    let mut path = Path::new(camera, recorder);
-    let mut sample = Sample::default();
-    counters.camera_rays += 1;
-    loop {
-        // Where the path goes next, and the light it runs into there.
-        counters.closest_hit_rays += 1;
-        let Some(hit) = queries.intersect(&path.ray) else {
+) {
+    let mut paths: Vec<_> = paths.collect();
+    while !paths.is_empty() {
+        // Where the paths go next, the light they run into there, and what is there.
+        counters.closest_hit_rays += paths.len() as u64;
+        paths.iter_mut().for_each(|path| path.hit = queries.intersect(&path.carried.ray));
+        paths.retain_mut(|path| path.meet(world, first_hit));
+
+        // Light that light samples bring, if nothing is in between.
+        paths.iter_mut().for_each(|path| path.look(world));
+        for place in paths.iter_mut().filter_map(|path| path.place.as_mut()) {
+            let Some((_, segment)) = &place.light else { continue };
+            counters.shadow_rays += 1;
+            if queries.occluded(segment) {
+                place.light = None;
+            }
+        }
+
+        // The directions in which they go on.
+        paths.retain_mut(|path| path.go_on(counters));
+    }
+}
+
+/// A path in the making.
+pub struct Path<'w, R> {
+    carried: Carried<R>,
+    numbers: Numbers,
+    sample: Sample,
+    /// What the ray has met.
+    hit: Option<Hit>,
+    /// Where that is; `None` also at an interface between media, which is nothing.
+    place: Option<Place<'w>>,
+}
+
+/// A vertex of a path with all that is found out there.
+struct Place<'w> {
+    surface: SurfaceInteraction<'w>,
+    shading: Shading<'w>,
+    wo: LocalDir,
+    numbers: VertexNumbers,
+    /// What a light sample brings if nothing is on the ray.
+    light: Option<(DirectLight, Ray)>,
+}
+
+impl Place<'_> {
+    #[inline]
+    fn vertex(&self) -> Vertex<'_> {
+        Vertex { surface: &self.surface, shading: &self.shading, wo: self.wo }
+    }
+}
+
+impl<'w, R: Recorder> Path<'w, R> {
+    /// The path of a camera ray; `recorder` will see all that happens to it.
+    pub fn new(camera: &CameraRay, numbers: Numbers, recorder: R) -> Self {
+        let carried = Carried::new(camera, recorder);
+        Self { carried, numbers, sample: Sample::default(), hit: None, place: None }
+    }
+
+    /// What a path that has been traced brings back, and its recorder.
+    pub fn end(self) -> (Sample, R) {
+        (Sample { radiance: self.carried.radiance, ..self.sample }, self.carried.recorder)
+    }
+
+    /// The light that the ray has run into, and what is there. Whether the path scatters there or goes on as it is.
+    fn meet(&mut self, world: &'w World, first_hit: bool) -> bool {
+        let path = &mut self.carried;
+        self.place = None;
+        let Some(hit) = &self.hit else {
             path.escape(world);
-            break;
+            return false;
         };
-        let surface = world.geometry.interaction(&path.ray, &hit);
+        let surface = world.geometry.interaction(&path.ray, hit);
         path.advance(surface.t);
         let emitted = direct::emitted(world, &surface, path.last.as_ref());
         emitted.into_iter().for_each(|(radiance, group)| path.meets(radiance, group));
         if path.bounce == world.integrator.max_depth {
-            break;
+            return false;
         }
-
-        // What is there; an interface between media is nothing.
         let Some(mut shading) = world.shade(&surface, path.cone_radius) else {
             path.ray = spawn_ray(surface.point, surface.ng, path.ray.direction);
-            continue;
+            return true;
         };
         if world.integrator.regularize && path.roughened {
             shading.bsdf = shading.bsdf.regularized();
         }
-        let vertex = Vertex { wo: shading.frame.to_local(surface.wo), surface: &surface, shading: &shading };
+        let (wo, numbers) = (shading.frame.to_local(surface.wo), self.numbers.vertex(path.bounce));
+        let place = self.place.insert(Place { surface, shading, wo, numbers, light: None });
         if path.bounce == 0 {
-            sample.alpha = 1.0;
-            sample.first = if first_hit { vertex.first_hit(world) } else { FirstHit::default() };
+            self.sample.alpha = 1.0;
+            self.sample.first = if first_hit { place.vertex().first_hit(world) } else { FirstHit::default() };
         }
+        path.arrive(&place.vertex());
+        true
+    }
 
-        // Light that a light sample brings, and the direction in which the path goes on.
-        path.arrive(&vertex);
-        let at_vertex = numbers.vertex(path.bounce);
-        if !vertex.shading.bsdf.is_specular() {
-            let light = direct::sample(world, queries, &vertex, &at_vertex, counters);
-            light.iter().for_each(|light| path.receive(&vertex, light));
-        }
-        let Some(next) = vertex.shading.bsdf.sample(vertex.wo, at_vertex.d1(Use::Lobe), at_vertex.d2(Use::Bsdf)) else {
-            break;
+    /// Samples a light.
+    fn look(&mut self, world: &World) {
+        let Some(place) = self.place.as_mut().filter(|place| !place.shading.bsdf.is_specular()) else { return };
+        place.light = direct::sample(world, &place.vertex(), &place.numbers);
+    }
+
+    /// Sends on what the light sample brings, and draws the direction in which the path goes on. Whether it does.
+    fn go_on(&mut self, counters: &mut Counters) -> bool {
+        let (path, Some(place)) = (&mut self.carried, &self.place) else { return true };
+        let (vertex, numbers) = (place.vertex(), &place.numbers);
+        place.light.iter().for_each(|(light, _)| path.receive(&vertex, light));
+        let Some(next) = place.shading.bsdf.sample(place.wo, numbers.d1(Use::Lobe), numbers.d2(Use::Bsdf)) else {
+            return false;
         };
         path.scatter(&vertex, &next);
         counters.scatterings += 1;
 
         let throughput = path.beta.max_element() * path.eta_scale;
-        let u = || numbers.d1(Dimension::at(path.bounce, Use::Roulette));
-        let Some(worth) = roulette::survive(throughput, path.bounce, u) else { break };
-        path.survive(worth);
+        let u = || self.numbers.d1(Dimension::at(path.bounce, Use::Roulette));
+        let worth = roulette::survive(throughput, path.bounce, u);
+        worth.into_iter().for_each(|worth| path.survive(worth));
+        worth.is_some()
     }
-    sample.radiance = path.radiance;
-    sample
 }
 
 /// What a path carries from vertex to vertex.
-struct Path<'r, R> {
+struct Carried<R> {
     /// Radiance found so far, along the camera ray.
     radiance: Rgb,
     /// Product of f cosθ / pdf over the vertices so far.
@@ -106,7 +175,7 @@ struct Path<'r, R> {
     /// Growth of that per unit of distance.
     pixel_spread: f32,
     /// Is told of everything.
-    recorder: &'r mut R,
+    recorder: R,
 }
 
 /// A scattered path stands for this share of the lobe it was drawn from: sixteen paths through a pixel, each with a cone
@@ -114,8 +183,8 @@ struct Path<'r, R> {
 /// a little blunter or sharper than it might be.
 const LOBE_SHARE: f32 = 1.0 / 16.0;
 
-impl<'r, R: Recorder> Path<'r, R> {
-    fn new(camera: &CameraRay, recorder: &'r mut R) -> Self {
+impl<R: Recorder> Carried<R> {
+    fn new(camera: &CameraRay, recorder: R) -> Self {
         Self {
             radiance: Rgb::ZERO,
             beta: Rgb::ONE,

@@ -28,7 +28,7 @@ struct Lengths {
     worst: f32,
 }
 
-impl Recorder for Lengths {
+impl Recorder for &mut Lengths {
     fn arrive(&mut self, vertex: &Vertex<'_>, _: f32) {
         self.arrivals += 1;
         self.worst = self.worst.max((vertex.wo.vec().length_squared() - 1.0).abs());
@@ -52,7 +52,8 @@ fn directions_stay_unit_over_10_000_mirrors() {
     for k in 0..16 {
         let numbers = Sampler::new(1).pixel_sample([0, 0], k);
         let camera = world.camera.ray(4.0 * numbers.d2(Dimension::FILM), Vec2::splat(0.5)).unwrap();
-        trace(&world, &queries, &camera, &numbers, false, &mut lengths, &mut Counters::default());
+        let mut path = Path::new(&camera, numbers, &mut lengths);
+        trace(&world, &queries, std::iter::once(&mut path), false, &mut Counters::default());
     }
     assert!(lengths.arrivals > 100_000, "{} bounces", lengths.arrivals);
     // Into a frame and out of it each coordinate is a sum of three products, of 2⁻²⁴ each: 18 · 2⁻²⁴ of the squared length

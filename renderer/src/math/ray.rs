@@ -57,16 +57,13 @@ fn offset_origin(from: PointWithError, ng: Vec3, direction: Vec3) -> Vec3 {
     let distance = ng.abs().dot(from.error);
     let offset = if ng.dot(direction) < 0.0 { -ng * distance } else { ng * distance };
     let moved = from.p + offset;
+    // Without a branch: which sign goes with which is anyone's guess.
     let outward = |value: f32, offset: f32| {
-        if offset == 0.0 {
-            value
-        } else if value == 0.0 {
-            f32::from_bits(1).copysign(offset)
-        } else if (offset > 0.0) == (value > 0.0) {
-            next_away_from_zero(value)
-        } else {
-            next_towards_zero(value)
-        }
+        let from = if value == 0.0 { 0.0_f32.copysign(offset) } else { value };
+        let away = next_away_from_zero(from);
+        let towards = f32::from_bits(from.to_bits().wrapping_sub(1));
+        let next = if from.is_sign_positive() == offset.is_sign_positive() { away } else { towards };
+        if offset == 0.0 { value } else { next }
     };
     Vec3::new(outward(moved.x, offset.x), outward(moved.y, offset.y), outward(moved.z, offset.z))
 }
