@@ -267,7 +267,7 @@ impl Adaptive {
         let of_part = |part: &mut Part| {
             part.pairs.settle();
             let (cells, mut sides) = (&part.cells, Sides::default());
-            sides.add(part.pairs.settled(), trees, |pair| {
+            sides.add(&part.pairs.settled(), trees, |pair| {
                 let tree = pair.tree_of(2 * trees as usize);
                 cells[tree / trees as usize][tree % trees as usize].key(pair.index() as u32).level()
             });

@@ -126,6 +126,10 @@ pub type Estimates = Vec<Vec<[f32; 3]>>;
 pub trait Cells {
     /// All keys.
     fn keys(&self) -> Cow<'_, [CellKey]>;
+    /// Key of a cell.
+    fn key(&self, cell: u32) -> CellKey {
+        self.keys()[cell as usize]
+    }
     /// Sums of a cell.
     fn sums(&self, cell: u32) -> WideSums;
 }
@@ -133,6 +137,10 @@ pub trait Cells {
 impl<K: Key, T: Deref<Target = Table<K>>> Cells for T {
     fn keys(&self) -> Cow<'_, [CellKey]> {
         Table::keys(self).collect()
+    }
+
+    fn key(&self, cell: u32) -> CellKey {
+        Table::key(self, cell)
     }
 
     fn sums(&self, cell: u32) -> WideSums {
@@ -144,17 +152,21 @@ impl<K: Key, T: Deref<Target = Table<K>>> Cells for T {
 ///
 /// The same key may be in several tables, which then share the cell: its sums are those of all.
 pub fn estimate<C: Cells + Sync>(tables: &[C], quantum: &Quantum, shrinkage: &Shrinkage) -> (Estimates, u64) {
-    let keys: Vec<Cow<'_, [CellKey]>> = tables.par_iter().map(Cells::keys).collect();
-    let Some(coarsest) = keys.par_iter().flat_map_iter(|keys| keys.iter()).map(|key| key.level()).max() else {
+    // Keys are made from what tables hold whenever they are needed: all at once they would take more than the estimates.
+    let measure = |table: &C| {
+        let keys = table.keys();
+        (keys.len(), keys.iter().map(|key| key.level()).max())
+    };
+    let (cells, coarsest): (Vec<usize>, Vec<Option<i32>>) = tables.par_iter().map(measure).unzip();
+    let Some(coarsest) = coarsest.into_iter().flatten().max() else {
         return (vec![Vec::new(); tables.len()], 0);
     };
     let coarsest = coarsest + shrinkage.levels as i32;
     // Cells of different ancestors at the coarsest level know nothing of each other, so they can be worked on in
     // buckets, which fit into caches and occupy all threads. Most tables have cells in few of them.
-    let cells: usize = keys.iter().map(|keys| keys.len()).sum();
-    let count = (cells / BUCKET).next_power_of_two();
+    let count = (cells.iter().sum::<usize>() / BUCKET).next_power_of_two();
     let bucket = |key: &CellKey| key.ancestor(coarsest).hash() as u32 & (count as u32 - 1);
-    let orders: Vec<Runs> = keys.par_iter().map(|keys| Runs::new(keys.iter().map(bucket))).collect();
+    let orders: Vec<Runs> = tables.par_iter().map(|table| Runs::new(table.keys().iter().map(bucket))).collect();
     let sizes = orders.iter().map(|order| order.runs.len());
     let numbered = sizes.enumerate().flat_map(|(table, runs)| (0..runs).map(move |run| (table as u32, run as u32)));
     let numbered: Vec<(u32, u32)> = numbered.collect();
@@ -163,9 +175,9 @@ pub fn estimate<C: Cells + Sync>(tables: &[C], quantum: &Quantum, shrinkage: &Sh
     let work = |room: &mut Room, bucket: usize| {
         room.cells.clear();
         for (number, at) in by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]) {
-            let (table, keys) = (&tables[number as usize], &keys[number as usize]);
+            let table = &tables[number as usize];
             let items = orders[number as usize].items(at).iter();
-            room.cells.extend(items.map(|&cell| (keys[cell as usize], table.sums(cell))));
+            room.cells.extend(items.map(|&cell| (table.key(cell), table.sums(cell))));
         }
         room.estimate(coarsest, quantum, shrinkage)
     };
