@@ -68,7 +68,7 @@ fn pack(pair: &Pair, last: &Pair, bytes: &mut Vec<u8>) {
     };
     let codes = [code(0), code(1), code(2)];
     let width = (4 - cell.leading_zeros() as usize / 8).max(1);
-    bytes.push((width - 1 | codes[0] << 2 | codes[1] << 4 | codes[2] << 6) as u8);
+    bytes.push(((width - 1) | codes[0] << 2 | codes[1] << 4 | codes[2] << 6) as u8);
     bytes.extend_from_slice(&cell.to_le_bytes()[..width]);
     for (code, x) in codes.into_iter().zip(throughput) {
         bytes.extend_from_slice(&x.to_le_bytes()[..WIDTHS[code]]);
@@ -79,15 +79,15 @@ fn pack(pair: &Pair, last: &Pair, bytes: &mut Vec<u8>) {
 fn unpack(bytes: &mut &[u8], last: &Pair) -> Option<Pair> {
     let (mut step, mut shift) = (0, 0);
     loop {
-        let byte = *bytes.split_off_first()?;
+        let byte = take_byte(bytes)?;
         step |= u32::from(byte & 0x7f) << shift;
         shift += 7;
         if byte < 0x80 {
             break;
         }
     }
-    let head = usize::from(*bytes.split_off_first()?);
-    let cell = number(bytes, (head & 3) + 1)?.wrapping_add(if step == 0 { last.cell() } else { 0 });
+    let head = usize::from(take_byte(bytes)?);
+    let cell = take(bytes, (head & 3) + 1)?.wrapping_add(if step == 0 { last.cell() } else { 0 });
     let mut throughput = last.throughput();
     for c in 0..3 {
         let width = WIDTHS[head >> (2 * c + 2) & 3];
@@ -96,7 +96,7 @@ fn unpack(bytes: &mut &[u8], last: &Pair) -> Option<Pair> {
         } else {
             // The sign is that of the last byte.
             let unused = 32 - 8 * width as u32;
-            (number(bytes, width)? << unused) as i32 >> unused
+            (take(bytes, width)? << unused) as i32 >> unused
         };
     }
     Some(Pair::of_label(last.label().wrapping_add(step), cell, throughput))
@@ -108,9 +108,17 @@ fn expected(throughput: [i32; 3], last: [i32; 3]) -> [i32; 3] {
     if throughput[0] == last[0] { last } else { [last[0], throughput[0], throughput[1]] }
 }
 
+/// Takes a byte off the front.
+fn take_byte(bytes: &mut &[u8]) -> Option<u8> {
+    let (byte, rest) = bytes.split_first()?;
+    *bytes = rest;
+    Some(*byte)
+}
+
 /// Takes a number of so many bytes off the front.
-fn number(bytes: &mut &[u8], width: usize) -> Option<u32> {
-    let own = bytes.split_off(..width)?;
+fn take(bytes: &mut &[u8], width: usize) -> Option<u32> {
+    let (own, rest) = bytes.split_at_checked(width)?;
+    *bytes = rest;
     Some(own.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte)))
 }
 
