@@ -105,6 +105,11 @@ pub(crate) struct Tree {
     pub cells: ShardedTable,
 }
 
+/// What the pairs of a part read from the estimates of all trees, diffuse and then glossy.
+fn reader(estimates: &[Estimates], trees: usize, part: usize) -> impl Fn(PairLobe, usize, u32) -> [f32; 3] + '_ {
+    move |lobe, tree, cell| estimates[lobe as usize * trees + tree][part][cell as usize]
+}
+
 /// The grids of several trees.
 fn grids(anchor: &Anchor, count: u32) -> impl Iterator<Item = Grid> {
     (0..count).map(move |index| Grid::new(anchor, index, count))
@@ -176,24 +181,43 @@ impl Adaptive {
     /// # Panics
     /// If there are not as many parts as were announced.
     pub fn add(&mut self, parts: &[Vec<PathRecord>]) {
+        self.add_each(parts.iter().collect(), false);
+    }
+
+    /// The same of the last block: gives memory back as it goes, so that what grows has room. If its epoch `ends` with it, all
+    /// that second vertices share goes too.
+    ///
+    /// # Panics
+    /// As [`Self::add`].
+    pub fn add_last(&mut self, parts: Vec<Vec<PathRecord>>, ends: bool) {
+        self.add_each(parts, ends);
+    }
+
+    /// Adds records that are dropped part by part if they are owned.
+    fn add_each<R: AsRef<[PathRecord]> + Send + Sync>(&mut self, parts: Vec<R>, ends: bool) {
         assert_eq!(parts.len(), self.parts.len(), "parts of a block");
-        let (vertices, estimates) = self.share(parts);
+        let (vertices, estimates) = self.share(&parts);
+        if ends {
+            self.report.bytes = self.bytes();
+            self.second.iter_mut().for_each(|tree| tree.cells = ShardedTable::default());
+        }
+        self.report.paths += parts.iter().map(|records| records.as_ref().len() as u64).sum::<u64>();
         let rules = Rules { params: &self.params, quantum: &self.quantum, grids: &self.grids };
-        let unfiltered = (&mut self.parts, parts, &vertices)
-            .into_par_iter()
-            .map_init(first::Batch::default, |batch, (part, records, vertices)| {
-                part.add(records, &Suffixes::new(vertices, &estimates), &rules, batch)
-            });
+        let unfiltered = (&mut self.parts, parts, vertices).into_par_iter().map_init(
+            first::Batch::default,
+            |batch, (part, records, vertices)| {
+                part.add(records.as_ref(), &Suffixes::new(&vertices, &estimates), &rules, batch)
+            },
+        );
         self.report.unfiltered += unfiltered.sum::<u64>();
-        self.report.paths += parts.iter().map(|records| records.len() as u64).sum::<u64>();
         self.cells = None;
     }
 
     /// Deposits a block's second vertices, and estimates all cells of the epoch so far, tree by tree.
-    fn share(&mut self, parts: &[Vec<PathRecord>]) -> (Vec<SecondVertices>, Vec<Estimates>) {
+    fn share<R: AsRef<[PathRecord]> + Sync>(&mut self, parts: &[R]) -> (Vec<SecondVertices>, Vec<Estimates>) {
         let (trees, quantum, side) = (&self.second, &self.quantum, self.params.second_leaf);
         let vertices = parts.par_iter().map_init(second::Batch::default, |batch, records| {
-            SecondVertices::new(records, trees, side, quantum, batch)
+            SecondVertices::new(records.as_ref(), trees, side, quantum, batch)
         });
         let vertices = vertices.collect();
         self.report.second_cells = 0;
@@ -221,7 +245,7 @@ impl Adaptive {
 
     /// The same at the end, and what was done: gives memory back as it goes.
     pub fn finish(mut self) -> (Vec<Vec<(u32, Resolved)>>, Report) {
-        let bytes = self.bytes();
+        let bytes = self.bytes().max(self.report.bytes);
         self.second.clear();
         let (mut cells, mut estimates) = (0, Vec::new());
         for tree in 0..2 * self.grids.len() {
@@ -231,19 +255,22 @@ impl Adaptive {
             let (lobe, tree) = (tree / self.grids.len(), tree % self.grids.len());
             self.parts.iter_mut().for_each(|part| part.cells[lobe][tree] = Table::default());
         }
-        let resolved = self.read(&estimates);
         self.cells = Some(cells);
-        (resolved, Report { bytes, ..self.report() })
+        self.settle();
+        let report = self.report();
+        let (quantum, trees) = (&self.quantum, self.grids.len());
+        // The pairs of a part are dropped when it has read.
+        let resolved = self.parts.into_par_iter().enumerate().map(|(at, part)| {
+            let mut pairs = part.pairs;
+            pairs.resolve(quantum, reader(&estimates, trees, at))
+        });
+        (resolved.collect(), Report { bytes, ..report })
     }
 
     /// What each slot gets, given the estimates.
     fn read(&mut self, estimates: &[Estimates]) -> Vec<Vec<(u32, Resolved)>> {
         let (quantum, trees) = (&self.quantum, self.grids.len());
-        let resolve = |(at, part): (usize, &mut Part)| {
-            part.pairs.resolve(quantum, |lobe: PairLobe, tree: usize, cell: u32| {
-                estimates[lobe as usize * trees + tree][at][cell as usize]
-            })
-        };
+        let resolve = |(at, part): (usize, &mut Part)| part.pairs.resolve(quantum, reader(estimates, trees, at));
         self.parts.par_iter_mut().enumerate().map(resolve).collect()
     }
 
@@ -267,7 +294,7 @@ impl Adaptive {
         let of_part = |part: &mut Part| {
             part.pairs.settle();
             let (cells, mut sides) = (&part.cells, Sides::default());
-            sides.add(part.pairs.settled(), trees, |pair| {
+            sides.add(&part.pairs.settled(), trees, |pair| {
                 let tree = pair.tree_of(2 * trees as usize);
                 cells[tree / trees as usize][tree % trees as usize].key(pair.index() as u32).level()
             });
@@ -287,7 +314,12 @@ impl Adaptive {
             self.estimates();
         }
         let pairs = self.parts.iter().map(|part| part.pairs.len() as u64).sum();
-        Report { cells: self.cells.unwrap_or_default(), pairs, bytes: self.bytes(), ..self.report }
+        Report {
+            cells: self.cells.unwrap_or_default(),
+            pairs,
+            bytes: self.bytes().max(self.report.bytes),
+            ..self.report
+        }
     }
 
     fn bytes(&self) -> u64 {

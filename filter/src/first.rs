@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::adaptive::{Params, place};
 use crate::grid::{Grid, LeafCell, Places};
-use crate::pairs::{Lobe as PairLobe, Pairs};
+use crate::pairs::{Lobe as PairLobe, Pair, Pairs};
 use crate::record::{Lobe, PathRecord};
 use crate::second::Suffixes;
 use crate::sums::{Deposit, Quantum};
@@ -50,6 +50,8 @@ pub(crate) struct Batch {
     shares: [Vec<Share>; 2],
     /// Paths of which some light went to no cell.
     unfiltered: Vec<u32>,
+    /// For the pairs of a block.
+    pairs: Vec<Pair>,
 }
 
 impl Part {
@@ -72,10 +74,12 @@ impl Part {
         rules: &Rules<'_>,
         batch: &mut Batch,
     ) -> u64 {
-        let mut unfiltered = 0;
-        if !records.is_empty() {
-            self.cells.iter().flatten().for_each(Table::warm);
+        if records.is_empty() {
+            return 0;
         }
+        let mut unfiltered = 0;
+        self.cells.iter().flatten().for_each(Table::warm);
+        self.pairs.begin_block(std::mem::take(&mut batch.pairs));
         for (first, records) in (0..).step_by(Places::MOST).zip(records.chunks(Places::MOST)) {
             batch.gather(records, |path| suffixes.get(first + path, &records[path]), rules, &mut self.pairs);
             for (tree, grid) in rules.grids.iter().enumerate() {
@@ -86,7 +90,7 @@ impl Part {
             }
             unfiltered += batch.read(records, rules, &mut self.pairs);
         }
-        self.pairs.end_block();
+        batch.pairs = self.pairs.end_block();
         unfiltered
     }
 }

@@ -104,6 +104,7 @@ const MORTON: u64 = (1 << (3 * COORDINATE_BITS)) - 1;
 const EVERY_THIRD: u64 = MORTON / 7;
 
 /// Attributes that fit in a key.
+#[cfg(test)]
 const ATTRIBUTES: u64 = (1 << 48) - 1;
 
 /// Puts two zeros between the lower 21 bits of a number.
@@ -190,10 +191,8 @@ impl Grid {
         }
         leaves.clear();
         leaves.extend(
-            places.upper.iter().zip(&facings).zip(&cells).map(|((upper, facing), cell)| LeafCell {
-                level_and_attributes: upper | u64::from(*facing),
-                cell: *cell,
-            }),
+            (places.upper.iter().zip(&facings).zip(&cells))
+                .map(|((upper, facing), cell)| LeafCell { upper: upper | u64::from(*facing), cell: *cell }),
         );
     }
 }
@@ -217,13 +216,57 @@ fn floor(x: f64) -> u64 {
 /// A cell by its coordinates: quicker to make than a [`CellKey`], and as exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LeafCell {
-    /// The upper half of the [`CellKey`].
-    level_and_attributes: u64,
+    /// Level, biased, and below it attributes: [`Self::UPPER_BITS`], as many as those of vertices need.
+    upper: u64,
     /// Coordinates, one after the other.
     cell: u64,
 }
 
+/// Attributes of vertices: a surface, a bin, and the facing.
+const LEAF_ATTRIBUTE_BITS: u32 = 24 + 8 + FACING_BITS;
+const LEAF_ATTRIBUTES: u64 = (1 << LEAF_ATTRIBUTE_BITS) - 1;
+/// Bits of levels, which are exponents of f64 and a few less.
+const LEAF_LEVEL_BITS: u32 = 13;
+const LEAF_LEVEL_BIAS: i32 = 1 << (LEAF_LEVEL_BITS - 1);
+
 impl LeafCell {
+    /// Bits of [`Self::upper`].
+    pub const UPPER_BITS: u32 = LEAF_LEVEL_BITS + LEAF_ATTRIBUTE_BITS;
+    /// All of them.
+    pub const UPPER: u64 = (1 << Self::UPPER_BITS) - 1;
+
+    /// From [`Self::upper`] and [`Self::lower`].
+    #[inline]
+    pub fn from_parts(upper: u64, lower: u64) -> Self {
+        Self { upper, cell: lower }
+    }
+
+    /// Level and attributes.
+    #[inline]
+    pub fn upper(&self) -> u64 {
+        self.upper
+    }
+
+    /// Coordinates, 63 bits.
+    #[inline]
+    pub fn lower(&self) -> u64 {
+        self.cell
+    }
+
+    /// Level and attributes of a key. Of attributes that no vertex has, which only a damaged file can bring, some bits are
+    /// lost.
+    #[inline]
+    pub fn upper_of(key: CellKey) -> u64 {
+        upper(key.level(), key.upper())
+    }
+
+    /// The key of this level and these attributes, with the code of its coordinates.
+    #[inline]
+    pub fn key_of(upper: u64, code: u64) -> CellKey {
+        let level = (upper >> LEAF_ATTRIBUTE_BITS) as i32 + LEVEL_BIAS - LEAF_LEVEL_BIAS;
+        CellKey(u128::from((level as u64) << 48 | upper & LEAF_ATTRIBUTES) << 64 | u128::from(code))
+    }
+
     /// Whether it is a cell.
     #[inline]
     pub fn exists(&self) -> bool {
@@ -233,20 +276,20 @@ impl LeafCell {
     /// The cell of the same place for vertices of attributes that differ by `bin` in their lower bits, which are 0 here.
     #[inline]
     pub fn with_bin(self, bin: u8) -> Self {
-        Self { level_and_attributes: self.level_and_attributes | u64::from(bin) << FACING_BITS, ..self }
+        Self { upper: self.upper | u64::from(bin) << FACING_BITS, ..self }
     }
 
     /// The cell's key.
     #[inline]
     pub fn key(&self) -> CellKey {
         let [x, y, z] = [0, 1, 2].map(|axis| spread(self.cell >> (axis * COORDINATE_BITS)));
-        CellKey(u128::from(self.level_and_attributes) << 64 | u128::from(x | y << 1 | z << 2))
+        Self::key_of(self.upper, x | y << 1 | z << 2)
     }
 
     /// Bits that differ between the cells of a neighbourhood: good enough for a small table.
     #[inline]
     pub fn quick_hash(&self) -> u64 {
-        let mixed = self.cell.wrapping_mul(0xd6e8_feb8_6659_fd93) ^ self.level_and_attributes;
+        let mixed = self.cell.wrapping_mul(0xd6e8_feb8_6659_fd93) ^ self.upper;
         let mixed = (mixed ^ mixed >> 32).wrapping_mul(0xff51_afd7_ed55_8ccd);
         mixed ^ mixed >> 32
     }
@@ -259,8 +302,15 @@ impl From<CellKey> for LeafCell {
     fn from(key: CellKey) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| gather(key.0 as u64 >> axis));
         let cell = x | y << COORDINATE_BITS | z << (2 * COORDINATE_BITS);
-        Self { level_and_attributes: (key.0 >> 64) as u64, cell }
+        Self { upper: Self::upper_of(key), cell }
     }
+}
+
+/// See [`LeafCell::upper`].
+#[inline]
+fn upper(level: i32, attributes: u64) -> u64 {
+    let level = (level + LEAF_LEVEL_BIAS) as u64 & ((1 << LEAF_LEVEL_BITS) - 1);
+    level << LEAF_ATTRIBUTE_BITS | attributes & LEAF_ATTRIBUTES
 }
 
 /// Vertices as grids see them, coordinate by coordinate.
@@ -270,7 +320,7 @@ pub struct Places {
     n: [Vec<f32>; 3],
     /// 2^-level.
     inverse_side: Vec<f64>,
-    /// The upper half of their cells' keys, without the facing.
+    /// Level and attributes of their cells, without the facing.
     upper: Vec<u64>,
 }
 
@@ -287,14 +337,14 @@ impl Places {
     }
 
     /// A vertex at `p` that faces `n`, whose finest cells are more than `side` / 4 and at most `side` / 2 wide before the
-    /// tree's scale, and of level `finest` at least. `attributes`: 45 bits that vertices must agree in to meet.
+    /// tree's scale, and of level `finest` at least. `attributes`: 32 bits that vertices must agree in to meet.
     #[inline]
     pub fn push(&mut self, p: [f32; 3], n: Vec3, side: f32, finest: i32, attributes: u64) {
         let level = (exponent_of(f64::from(side)) - 1).max(finest);
         self.p.iter_mut().zip(p).for_each(|(list, x)| list.push(x.into()));
         self.n.iter_mut().zip(n.to_array()).for_each(|(list, x)| list.push(x));
         self.inverse_side.push(power_of_two(-level));
-        self.upper.push(u64::from((level + LEVEL_BIAS) as u16) << 48 | attributes << FACING_BITS & ATTRIBUTES);
+        self.upper.push(upper(level, attributes << FACING_BITS));
     }
 }
 

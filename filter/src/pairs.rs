@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use crate::adaptive::Resolved;
+use crate::packed_pairs::PackedPairs;
+use crate::slot_sums::SlotSums;
 use crate::sums::Quantum;
 
 /// Which estimate a pair reads.
@@ -17,9 +19,9 @@ pub(crate) enum Lobe {
 /// A slot, a cell of its part, and the throughput of all paths between them. 20 bytes.
 ///
 /// Throughputs are whole multiples of 2⁻²⁰, so sums are exact in any order; a sum that would overflow begins another pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Pair {
-    /// Slot, and below it the lobe and the tree: [`Pair::label`].
+    /// See [`Pair::label_of`].
     slot_lobe_tree: u32,
     cell: u32,
     throughput: [i32; 3],
@@ -29,8 +31,26 @@ const TREE_BITS: u32 = 3;
 const THROUGHPUT_BITS: i32 = 20;
 
 impl Pair {
-    fn label(slot: u32, lobe: Lobe, tree: u32) -> u32 {
+    fn label_of(slot: u32, lobe: Lobe, tree: u32) -> u32 {
         slot << (TREE_BITS + 1) | (lobe as u32) << TREE_BITS | tree
+    }
+
+    /// From [`Self::label`], cell and throughput.
+    #[inline]
+    pub fn of_label(label: u32, cell: u32, throughput: [i32; 3]) -> Self {
+        Self { slot_lobe_tree: label, cell, throughput }
+    }
+
+    /// Slot, and below it the lobe and the tree.
+    #[inline]
+    pub fn label(&self) -> u32 {
+        self.slot_lobe_tree
+    }
+
+    /// Its cell.
+    #[inline]
+    pub fn cell(&self) -> u32 {
+        self.cell
     }
 
     pub fn slot(&self) -> u32 {
@@ -68,7 +88,7 @@ impl Pair {
     /// A pair of `slot` and a cell of one of `trees` trees, diffuse and then glossy; `None` for a slot that no pair can have.
     pub fn of_tree(slot: u32, tree: usize, trees: usize, cell: u32, throughput: [i32; 3]) -> Option<Self> {
         let (lobe, tree) = if tree < trees / 2 { (Lobe::Diffuse, tree) } else { (Lobe::Glossy, tree - trees / 2) };
-        let slot_lobe_tree = Self::label(slot, lobe, tree as u32);
+        let slot_lobe_tree = Self::label_of(slot, lobe, tree as u32);
         let pair = Self { slot_lobe_tree, cell, throughput };
         (pair.slot() == slot).then_some(pair)
     }
@@ -123,47 +143,15 @@ impl Own {
     }
 }
 
-/// Two sums for each of some slots, by slot.
-#[derive(Debug, Default)]
-struct SlotSums {
-    sums: Vec<(u32, [[i64; 3]; 2])>,
-    /// Where in it the last path's slot is.
-    last: usize,
-}
-
-impl SlotSums {
-    /// The sums of a slot.
-    fn at(&mut self, slot: u32) -> &mut [[i64; 3]; 2] {
-        // Paths of a slot come one after the other.
-        if self.sums.get(self.last).is_none_or(|(at, _)| *at != slot) {
-            self.last = self.sums.binary_search_by_key(&slot, |(at, _)| *at).unwrap_or_else(|at| {
-                if self.sums.len() == self.sums.capacity() {
-                    self.sums.reserve_exact((self.sums.len() / 4).max(16));
-                }
-                self.sums.insert(at, (slot, Default::default()));
-                at
-            });
-        }
-        &mut self.sums[self.last].1
-    }
-
-    /// Adds to the sums of a slot.
-    fn absorb(&mut self, slot: u32, others: &[[i64; 3]; 2]) {
-        let sums = self.at(slot).as_flattened_mut();
-        sums.iter_mut().zip(others.as_flattened()).for_each(|(sum, x)| *sum = sum.saturating_add(*x));
-    }
-
-    fn bytes(&self) -> usize {
-        self.sums.capacity() * size_of::<(u32, [[i64; 3]; 2])>()
-    }
-}
-
 /// All pairs of one part.
 #[derive(Debug, Default)]
 pub(crate) struct Pairs {
-    /// Sorted and without repetition up to `compact`, then as they came.
-    pairs: Vec<Pair>,
-    compact: usize,
+    /// Sorted and without repetition.
+    united: PackedPairs,
+    /// Of blocks that have ended since, sorted block by block.
+    recent: PackedPairs,
+    /// Of the current block, as they come.
+    block: Vec<Pair>,
     /// See [`Own::glossy`], of slots that have some.
     glossy: SlotSums,
     /// See [`Own::unfiltered`], likewise: there are hardly any.
@@ -180,36 +168,32 @@ impl Pairs {
             return false;
         }
         let throughput = (throughput * SCALE).to_array().map(|x| (x + 0.5f32.copysign(x)) as i32);
-        let pair = Pair { slot_lobe_tree: Pair::label(slot, lobe, tree), cell, throughput };
+        let pair = Pair { slot_lobe_tree: Pair::label_of(slot, lobe, tree), cell, throughput };
         // A pixel's samples come one after the other and mostly read one of a few cells.
-        let recent = self.pairs.len().saturating_sub(8);
-        let mut of_slot = self.pairs[recent..].iter_mut().rev().take_while(|known| known.slot() == slot);
+        let recent = self.block.len().saturating_sub(8);
+        let mut of_slot = self.block[recent..].iter_mut().rev().take_while(|known| known.slot() == slot);
         let known = of_slot.find(|known| known.order() == pair.order());
         if !known.is_some_and(|known| known.absorb(&pair)) {
-            if self.pairs.len() == self.pairs.capacity() {
-                // By a quarter where doubling would waste half.
-                self.pairs.reserve_exact((self.pairs.len() / 4).max(64));
-            }
-            self.pairs.push(pair);
+            self.block.push(pair);
         }
         true
     }
 
     /// Adds what a path brings through glossy lobes.
     pub fn add_own(&mut self, slot: u32, odd: bool, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.glossy.at(slot)[usize::from(odd)], radiance, quantum);
+        self.glossy.add(slot, odd.into(), quanta(radiance, quantum));
     }
 
     /// Adds what a path brings that no cell could take.
     pub fn add_unfiltered(&mut self, slot: u32, lobe: Lobe, radiance: Vec3, quantum: &Quantum) {
-        add_quanta(&mut self.unfiltered.at(slot)[lobe as usize], radiance, quantum);
+        self.unfiltered.add(slot, lobe as usize, quanta(radiance, quantum));
     }
 
     /// Sums of slots, by slot.
     fn own(&self) -> Vec<(u32, Own)> {
-        let mut own = Vec::with_capacity(self.glossy.sums.len().max(self.unfiltered.sums.len()));
-        let mut unfiltered = self.unfiltered.sums.iter().copied().peekable();
-        for &(slot, glossy) in &self.glossy.sums {
+        let mut own = Vec::with_capacity(self.glossy.len().max(self.unfiltered.len()));
+        let mut unfiltered = self.unfiltered.iter().peekable();
+        for (slot, glossy) in self.glossy.iter() {
             while let Some((slot, unfiltered)) = unfiltered.next_if(|(at, _)| *at < slot) {
                 own.push((slot, Own { unfiltered, ..Own::default() }));
             }
@@ -220,25 +204,39 @@ impl Pairs {
         own
     }
 
-    /// Ends a block.
-    pub fn end_block(&mut self) {
-        // Only when the list has grown by half: that keeps the work per path constant.
-        if self.pairs.len() >= self.compact + self.compact / 2 {
-            self.compact();
+    /// Begins a block, with memory of the last one's.
+    pub fn begin_block(&mut self, room: Vec<Pair>) {
+        self.block = room;
+    }
+
+    /// Ends a block; its memory is for the next one, whosever it is.
+    pub fn end_block(&mut self) -> Vec<Pair> {
+        let mut block = std::mem::take(&mut self.block);
+        block.sort_unstable_by_key(Pair::order);
+        Pair::unite(&mut block);
+        // Only when there is half as much again: that keeps the work per path constant.
+        if self.recent.len() + block.len() >= self.united.len() / 2 {
+            self.unite(&block);
+        } else {
+            self.recent.extend(&block);
         }
+        self.glossy.shrink();
+        self.unfiltered.shrink();
+        block.clear();
+        block
     }
 
     /// Orders the pairs of blocks that have ended.
     pub fn settle(&mut self) {
-        if self.compact < self.pairs.len() {
-            self.compact();
+        if self.recent.len() > 0 {
+            self.unite(&[]);
         }
     }
 
     /// All pairs by slot and cell, after [`Self::settle`].
-    pub fn settled(&self) -> &[Pair] {
-        assert_eq!(self.compact, self.pairs.len(), "pairs are read before they were settled");
-        &self.pairs
+    pub fn settled(&self) -> Vec<Pair> {
+        assert_eq!(self.recent.len() + self.block.len(), 0, "pairs are read before they were settled");
+        self.united.iter().collect()
     }
 
     /// Sums of slots that need no cell.
@@ -248,7 +246,7 @@ impl Pairs {
 
     /// Adds others', whose cells have the numbers of the large tables.
     pub fn absorb(&mut self, pairs: impl Iterator<Item = Pair>) {
-        self.pairs.extend(pairs);
+        self.block.extend(pairs);
         self.end_block();
     }
 
@@ -256,41 +254,42 @@ impl Pairs {
     pub fn absorb_own(&mut self, own: &[(u32, Own)]) {
         for (slot, sums) in own {
             // A slot that has sums keeps them, even of zeros: what is stored again is what was stored.
-            self.glossy.absorb(*slot, &sums.glossy);
+            sums.glossy.into_iter().enumerate().for_each(|(which, sum)| self.glossy.add(*slot, which, sum));
             if sums.unfiltered != [[0; 3]; 2] {
-                self.unfiltered.absorb(*slot, &sums.unfiltered);
+                sums.unfiltered.into_iter().enumerate().for_each(|(which, sum)| self.unfiltered.add(*slot, which, sum));
             }
         }
     }
 
-    fn compact(&mut self) {
-        // Each block brings its slots in order: the stable sort finds those runs and merges them. Then there are a few pairs
-        // of each slot, most of them in order.
-        self.pairs.sort_by_key(Pair::slot);
-        for of_slot in self.pairs.chunk_by_mut(|a, b| a.slot() == b.slot()) {
-            of_slot.sort_unstable_by_key(Pair::order);
-        }
-        Pair::unite(&mut self.pairs);
-        self.compact = self.pairs.len();
-        self.pairs.shrink_to(self.compact + self.compact / 2);
+    /// Adds a sorted block, and all blocks before it, to those that are united.
+    fn unite(&mut self, block: &[Pair]) {
+        let (united, recent) = (std::mem::take(&mut self.united), std::mem::take(&mut self.recent));
+        let mut pairs = Vec::with_capacity(united.len() + recent.len() + block.len());
+        pairs.extend(united.iter().chain(recent.iter()));
+        pairs.extend_from_slice(block);
+        // The stable sort finds the sorted runs and merges them.
+        pairs.sort_by_key(Pair::order);
+        Pair::unite(&mut pairs);
+        drop((united, recent));
+        self.united.extend(&pairs);
     }
 
     /// Number of pairs.
     pub fn len(&self) -> usize {
-        self.pairs.len()
+        self.united.len() + self.recent.len() + self.block.len()
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.pairs.capacity() * size_of::<Pair>() + self.glossy.bytes() + self.unfiltered.bytes()
+        self.united.bytes() + self.recent.bytes() + self.glossy.bytes() + self.unfiltered.bytes()
     }
 
     /// What every slot gets when `read` tells the estimate of a cell. By slot.
     pub fn resolve(&mut self, quantum: &Quantum, read: impl Fn(Lobe, usize, u32) -> [f32; 3]) -> Vec<(u32, Resolved)> {
-        self.compact();
+        self.settle();
         let mut lobes: Vec<(u32, [[i128; 3]; 2])> = Vec::new();
         let estimate = |pair: &Pair| read(pair.lobe(), pair.tree() as usize, pair.cell);
-        products(&self.pairs, quantum, estimate, |pair, product| {
+        products(&self.settled(), quantum, estimate, |pair, product| {
             match lobes.last_mut() {
                 Some((slot, sums)) if *slot == pair.slot() => add(&mut sums[pair.lobe() as usize], &product),
                 _ => {
@@ -397,10 +396,9 @@ const RESOLVED_BITS: i32 = 10;
 /// Quanta of a slot's own sums are coarser than those of cells by this power of two.
 const OWN_SHIFT: i32 = 6;
 
-fn add_quanta(sum: &mut [i64; 3], radiance: Vec3, quantum: &Quantum) {
+/// Radiance in quanta of a slot's own sums.
+fn quanta(radiance: Vec3, quantum: &Quantum) -> [i64; 3] {
     let scale = 2f64.powi(-OWN_SHIFT) / quantum.radiance();
-    for (sum, x) in sum.iter_mut().zip(radiance.as_dvec3().to_array()) {
-        // A cast saturates and turns NaN into 0; the renderer rejects such samples before they come here.
-        *sum = sum.saturating_add((x * scale).round() as i64);
-    }
+    // A cast saturates and turns NaN into 0; the renderer rejects such samples before they come here.
+    radiance.as_dvec3().to_array().map(|x| (x * scale).round() as i64)
 }

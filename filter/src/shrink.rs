@@ -23,6 +23,7 @@
 
 use std::borrow::Cow;
 use std::ops::Deref;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -126,6 +127,10 @@ pub type Estimates = Vec<Vec<[f32; 3]>>;
 pub trait Cells {
     /// All keys.
     fn keys(&self) -> Cow<'_, [CellKey]>;
+    /// Key of a cell.
+    fn key(&self, cell: u32) -> CellKey {
+        self.keys()[cell as usize]
+    }
     /// Sums of a cell.
     fn sums(&self, cell: u32) -> WideSums;
 }
@@ -133,6 +138,10 @@ pub trait Cells {
 impl<K: Key, T: Deref<Target = Table<K>>> Cells for T {
     fn keys(&self) -> Cow<'_, [CellKey]> {
         Table::keys(self).collect()
+    }
+
+    fn key(&self, cell: u32) -> CellKey {
+        Table::key(self, cell)
     }
 
     fn sums(&self, cell: u32) -> WideSums {
@@ -144,53 +153,53 @@ impl<K: Key, T: Deref<Target = Table<K>>> Cells for T {
 ///
 /// The same key may be in several tables, which then share the cell: its sums are those of all.
 pub fn estimate<C: Cells + Sync>(tables: &[C], quantum: &Quantum, shrinkage: &Shrinkage) -> (Estimates, u64) {
-    let keys: Vec<Cow<'_, [CellKey]>> = tables.par_iter().map(Cells::keys).collect();
-    let Some(coarsest) = keys.par_iter().flat_map_iter(|keys| keys.iter()).map(|key| key.level()).max() else {
+    // Keys are made from what tables hold whenever they are needed: all at once they would take more than the estimates.
+    let measure = |table: &C| {
+        let keys = table.keys();
+        (keys.len(), keys.iter().map(|key| key.level()).max())
+    };
+    let (cells, coarsest): (Vec<usize>, Vec<Option<i32>>) = tables.par_iter().map(measure).unzip();
+    let Some(coarsest) = coarsest.into_iter().flatten().max() else {
         return (vec![Vec::new(); tables.len()], 0);
     };
     let coarsest = coarsest + shrinkage.levels as i32;
     // Cells of different ancestors at the coarsest level know nothing of each other, so they can be worked on in
     // buckets, which fit into caches and occupy all threads. Most tables have cells in few of them.
-    let cells: usize = keys.iter().map(|keys| keys.len()).sum();
-    let count = (cells / BUCKET).next_power_of_two();
+    let count = (cells.iter().sum::<usize>() / BUCKET).next_power_of_two();
     let bucket = |key: &CellKey| key.ancestor(coarsest).hash() as u32 & (count as u32 - 1);
-    let orders: Vec<Runs> = keys.par_iter().map(|keys| Runs::new(keys.iter().map(bucket))).collect();
+    let orders: Vec<Runs> = tables.par_iter().map(|table| Runs::new(table.keys().iter().map(bucket))).collect();
     let sizes = orders.iter().map(|order| order.runs.len());
     let numbered = sizes.enumerate().flat_map(|(table, runs)| (0..runs).map(move |run| (table as u32, run as u32)));
     let numbered: Vec<(u32, u32)> = numbered.collect();
     let run = |(table, run): (u32, u32)| &orders[table as usize].runs[run as usize];
     let by_bucket = Buckets::new(count, numbered.iter().map(|at| run(*at).bucket));
+    // Each is written once, by the bucket that has it, to where it belongs: in bits, which threads may write side by side.
+    let estimates: Vec<Vec<[AtomicU32; 3]>> =
+        cells.par_iter().map(|count| (0..*count).map(|_| Default::default()).collect()).collect();
     let work = |room: &mut Room, bucket: usize| {
+        let runs = || by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]);
         room.cells.clear();
-        for (number, at) in by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]) {
-            let (table, keys) = (&tables[number as usize], &keys[number as usize]);
+        for (number, at) in runs() {
+            let table = &tables[number as usize];
             let items = orders[number as usize].items(at).iter();
-            room.cells.extend(items.map(|&cell| (keys[cell as usize], table.sums(cell))));
+            room.cells.extend(items.map(|&cell| Place { key: table.key(cell), table: number, cell }));
         }
-        room.estimate(coarsest, quantum, shrinkage)
-    };
-    let (estimates, different): (Vec<Vec<[f32; 3]>>, Vec<u64>) =
-        (0..count).into_par_iter().map_init(Room::default, work).unzip();
-    // Where the estimates of each run begin in those of its bucket.
-    let mut begins: Vec<Vec<u32>> = orders.iter().map(|order| vec![0; order.runs.len()]).collect();
-    for bucket in 0..count {
-        let mut next = 0;
-        for (table, at) in by_bucket.get(bucket).iter().map(|&number| numbered[number as usize]) {
-            begins[table as usize][at as usize] = next;
-            next += orders[table as usize].items(at).len() as u32;
-        }
-    }
-    let by_table = |(order, begins): (&Runs, &Vec<u32>)| {
-        let mut of_table = vec![[0.0; 3]; order.cells.len()];
-        for ((at, run), begin) in (0..).zip(&order.runs).zip(begins) {
-            let found = &estimates[run.bucket as usize][*begin as usize..];
-            for (cell, estimate) in order.items(at).iter().zip(found) {
-                of_table[*cell as usize] = *estimate;
+        let sums = |place: &Place| tables[place.table as usize].sums(place.cell);
+        let different = room.estimate(sums, coarsest, quantum, shrinkage);
+        let mut found = room.estimates.iter();
+        for (number, at) in runs() {
+            let of_table = &estimates[number as usize];
+            for (cell, estimate) in orders[number as usize].items(at).iter().zip(found.by_ref()) {
+                let places = of_table[*cell as usize].iter().zip(estimate);
+                places.for_each(|(place, x)| place.store(x.to_bits(), Ordering::Relaxed));
             }
         }
-        of_table
+        different
     };
-    (orders.par_iter().zip(&begins).map(by_table).collect(), different.iter().sum())
+    let different = (0..count).into_par_iter().map_init(Room::default, work).sum();
+    let of_cell = |bits: [AtomicU32; 3]| bits.map(|x| f32::from_bits(x.into_inner()));
+    let of_table = |of_table: Vec<[AtomicU32; 3]>| of_table.into_iter().map(of_cell).collect();
+    (estimates.into_par_iter().map(of_table).collect(), different)
 }
 
 /// Cells of a bucket: few enough that their nodes stay in a core's cache, enough that a bucket is worth a task.
@@ -232,51 +241,66 @@ impl Runs {
     }
 }
 
+/// Where a cell is. Its sums stay there until they are needed: one bucket may have most cells of a wall.
+#[derive(Clone, Copy)]
+struct Place {
+    key: CellKey,
+    table: u32,
+    cell: u32,
+}
+
 /// Room for the cells of a bucket, to be used again.
 #[derive(Default)]
 struct Room {
     /// The cells as they come.
-    cells: Vec<(CellKey, WideSums)>,
+    cells: Vec<Place>,
     /// Different upper halves of their keys.
     upper: Vec<u64>,
     /// Lower halves of the keys of those of one upper half.
     lower: Vec<(u64, u32)>,
     /// Places of the cells in the order of their keys.
     order: Vec<u32>,
-    /// Different cells in the order of their keys.
-    leaves: Vec<Node>,
     /// The nodes of all levels of the trees above them, from fine to coarse.
     levels: Vec<Vec<Node>>,
     /// Those of a level that are no leaves.
     inner: Vec<Node>,
     /// Of each group of siblings of a level.
     scatters: Vec<Scatter>,
+    /// Of the cells as they came.
+    estimates: Vec<[f32; 3]>,
 }
 
 impl Room {
-    /// Estimates of the cells, and how many different cells they are.
-    fn estimate(&mut self, coarsest: i32, quantum: &Quantum, shrinkage: &Shrinkage) -> (Vec<[f32; 3]>, u64) {
+    /// Finds the estimates of the cells, and how many different cells they are.
+    fn estimate(
+        &mut self,
+        sums: impl Fn(&Place) -> WideSums,
+        coarsest: i32,
+        quantum: &Quantum,
+        shrinkage: &Shrinkage,
+    ) -> u64 {
         self.sort();
-        let cell = |at: u32| &self.cells[at as usize];
+        let Self { cells, order, levels, inner, scatters, estimates, .. } = self;
+        let same = |a: &u32, b: &u32| cells[*a as usize].key == cells[*b as usize].key;
         let leaf = |same: &[u32]| {
-            let (key, mut sums) = *cell(same[0]);
-            same[1..].iter().for_each(|&other| sums.merge(&cell(other).1));
-            let moments = Moments::of(&sums, quantum);
+            let places = same.iter().map(|&at| &cells[at as usize]);
+            let mut all = WideSums::default();
+            places.for_each(|place| all.merge(&sums(place)));
+            let (key, moments) = (cells[same[0] as usize].key, Moments::of(&all, quantum));
             Node { key, moments, estimate: moments.mean(), leaf: true, coarsest_leaf: key.level(), signal: 0.0 }
         };
-        self.leaves.clear();
-        self.leaves.extend(self.order.chunk_by(|&a, &b| cell(a).0 == cell(b).0).map(leaf));
-        let different = self.leaves.len() as u64;
-        self.estimate_levels(coarsest, shrinkage);
-        let mut estimates = vec![[0.0; 3]; self.cells.len()];
+        let different = order.chunk_by(same).count() as u64;
+        build(order.chunk_by(same).map(leaf), coarsest, levels, inner);
+        estimate_levels(levels, scatters, shrinkage);
+        estimates.clear();
+        estimates.resize(cells.len(), [0.0; 3]);
         // Both in the order of keys.
-        let nodes = self.levels.iter().flatten().filter(|node| node.leaf);
-        let cell = |at: u32| &self.cells[at as usize];
-        for (node, same) in nodes.zip(self.order.chunk_by(|&a, &b| cell(a).0 == cell(b).0)) {
+        let nodes = levels.iter().flatten().filter(|node| node.leaf);
+        for (node, same) in nodes.zip(order.chunk_by(same)) {
             let estimate = node.estimate.as_vec3().to_array();
             same.iter().for_each(|&other| estimates[other as usize] = estimate);
         }
-        (estimates, different)
+        different
     }
 
     /// Finds the order of the cells.
@@ -284,67 +308,67 @@ impl Room {
         let Self { cells, upper, lower, order, .. } = self;
         // Of the upper halves there are few: those are numbered, so that what remains to be sorted is short.
         upper.clear();
-        for (key, _) in &*cells {
+        for Place { key, .. } in &*cells {
             if upper.last() != Some(&key.upper()) && !upper.contains(&key.upper()) {
                 upper.push(key.upper());
             }
         }
         upper.sort_unstable();
         let group = |key: CellKey| upper.partition_point(|half| *half < key.upper()) as u32;
-        let groups = Buckets::new(upper.len(), cells.iter().map(|(key, _)| group(*key)));
+        let groups = Buckets::new(upper.len(), cells.iter().map(|place| group(place.key)));
         order.clear();
         for group in 0..upper.len() {
             lower.clear();
-            lower.extend(groups.get(group).iter().map(|&at| (cells[at as usize].0.lower(), at)));
+            lower.extend(groups.get(group).iter().map(|&at| (cells[at as usize].key.lower(), at)));
             lower.sort_unstable_by_key(|(lower, _)| *lower);
             order.extend(lower.iter().map(|(_, at)| *at));
         }
     }
+}
 
-    /// Makes the levels of the trees above the leaves, with their estimates.
-    fn estimate_levels(&mut self, coarsest: i32, shrinkage: &Shrinkage) {
-        let Self { leaves, levels, inner, scatters, .. } = self;
-        // From fine to coarse: each level is the parents of the one before, and the leaves of its own.
-        let finest = leaves.first().map_or(coarsest, |leaf| leaf.key.level());
-        levels.iter_mut().for_each(Vec::clear);
-        levels.resize_with((coarsest - finest + 1) as usize, Vec::new);
-        inner.clear();
-        let mut rest = leaves.as_slice();
-        for (level, nodes) in (finest..).zip(&mut *levels) {
-            let (own, coarser) = rest.split_at(rest.partition_point(|leaf| leaf.key.level() == level));
-            rest = coarser;
-            merge(inner, own, nodes);
-            parents(nodes, inner);
+/// Makes the levels of the trees above the leaves, which come by key, and up to the coarsest.
+fn build(leaves: impl Iterator<Item = Node>, coarsest: i32, levels: &mut Vec<Vec<Node>>, inner: &mut Vec<Node>) {
+    // From fine to coarse: each level is the parents of the one before, and the leaves of its own.
+    let mut leaves = leaves.peekable();
+    let finest = leaves.peek().map_or(coarsest, |leaf| leaf.key.level());
+    levels.iter_mut().for_each(Vec::clear);
+    levels.resize_with((coarsest - finest + 1) as usize, Vec::new);
+    inner.clear();
+    for (level, nodes) in (finest..).zip(levels) {
+        merge(inner, std::iter::from_fn(|| leaves.next_if(|leaf| leaf.key.level() == level)), nodes);
+        parents(nodes, inner);
+    }
+}
+
+/// Finds the estimates of all levels.
+fn estimate_levels(levels: &mut [Vec<Node>], scatters: &mut Vec<Scatter>, shrinkage: &Shrinkage) {
+    let levels_in_all = levels.len();
+    // From coarse to fine.
+    for level in (0..levels.len() - 1).rev() {
+        let (fine, coarse) = levels.split_at_mut(level + 1);
+        // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
+        let groups = || fine[level].chunk_by(siblings).zip(coarse[0].iter().filter(|node| !node.leaf));
+        scatters.clear();
+        // Cells that are too coarse for what they hold are in no tree: those below are roots.
+        let pools = |parent: &Node| parent.key.level() - parent.coarsest_leaf <= shrinkage.levels as i32;
+        scatters.extend(groups().map(|(group, parent)| match pools(parent) {
+            true => Scatter::new(group, parent, shrinkage.trusted),
+            false => Scatter::default(),
+        }));
+        // Parents that are siblings themselves; the coarsest are not, for their own parents are in no tree.
+        let mut rest = scatters.as_mut_slice();
+        let akin = |a: &Node, b: &Node| level + 2 < levels_in_all && siblings(a, b);
+        for parents in coarse[0].chunk_by(akin) {
+            let count = parents.iter().filter(|node| !node.leaf).count();
+            let (family, others) = std::mem::take(&mut rest).split_at_mut(count);
+            // Nothing of what is infinite is not a number, and nothing here.
+            believe(family, (shrinkage.inherited * parents[0].signal).max(0.0), shrinkage.certain);
+            rest = others;
         }
-        let levels_in_all = levels.len();
-
-        // From coarse to fine.
-        for level in (0..levels.len() - 1).rev() {
-            let (fine, coarse) = levels.split_at_mut(level + 1);
-            // The groups of siblings are in the order of their parents, which are the inner cells of the next level.
-            let groups = || fine[level].chunk_by(siblings).zip(coarse[0].iter().filter(|node| !node.leaf));
-            scatters.clear();
-            // Cells that are too coarse for what they hold are in no tree: those below are roots.
-            let pools = |parent: &Node| parent.key.level() - parent.coarsest_leaf <= shrinkage.levels as i32;
-            scatters.extend(groups().map(|(group, parent)| match pools(parent) {
-                true => Scatter::new(group, parent, shrinkage.trusted),
-                false => Scatter::default(),
-            }));
-            // Parents that are siblings themselves; the coarsest are not, for their own parents are in no tree.
-            let mut rest = scatters.as_mut_slice();
-            let akin = |a: &Node, b: &Node| level + 2 < levels_in_all && siblings(a, b);
-            for parents in coarse[0].chunk_by(akin) {
-                let count = parents.iter().filter(|node| !node.leaf).count();
-                let (family, others) = std::mem::take(&mut rest).split_at_mut(count);
-                // Nothing of what is infinite is not a number, and nothing here.
-                believe(family, (shrinkage.inherited * parents[0].signal).max(0.0), shrinkage.certain);
-                rest = others;
-            }
-            let parents = coarse[0].iter().filter(|node| !node.leaf);
-            for ((group, parent), scatter) in fine[level].chunk_by_mut(siblings).zip(parents).zip(&*scatters) {
-                if pools(parent) {
-                    shrink(group, parent, scatter.signal);
-                }
+        let parents = coarse[0].iter().filter(|node| !node.leaf);
+        for ((group, parent), scatter) in fine[level].chunk_by_mut(siblings).zip(parents).zip(&*scatters) {
+            if pools(parent) {
+                shrink(group, parent, scatter.signal);
             }
         }
     }
@@ -356,11 +380,11 @@ fn siblings(a: &Node, b: &Node) -> bool {
 }
 
 /// Two sorted lists as one. A cell may be in both: some of its deposits were finer than others, and the two are siblings.
-fn merge(inner: &[Node], leaves: &[Node], nodes: &mut Vec<Node>) {
-    let mut leaves = leaves.iter().peekable();
+fn merge(inner: &[Node], leaves: impl Iterator<Item = Node>, nodes: &mut Vec<Node>) {
+    let mut leaves = leaves.peekable();
     for node in inner {
         while let Some(leaf) = leaves.next_if(|leaf| leaf.key < node.key) {
-            nodes.push(*leaf);
+            nodes.push(leaf);
         }
         nodes.push(*node);
     }

@@ -84,26 +84,23 @@ impl Quantum {
 /// What one path brings to a cell, in quanta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Deposit {
-    rgb: [u64; 3],
+    pub(crate) rgb: [u64; 3],
     /// Up to 2⁸⁰: the lower 64 bits and those above.
-    square: u64,
+    pub(crate) square: u64,
     square_above: u32,
-    weight: u32,
+    pub(crate) weight: u32,
 }
 
 impl Deposit {
     /// Whether its square is small enough for a cell's own sums.
     #[inline]
-    fn narrow(&self) -> bool {
+    pub(crate) fn narrow(&self) -> bool {
         self.square_above == 0 && self.square < LIMIT
     }
 }
 
 /// Sums of a cell that hold what cells usually hold; more is handed to [`WideSums`].
 pub trait CellSums: Copy + Default + std::fmt::Debug + Send + Sync {
-    /// Adds a deposit; false, and unchanged, if it does not fit.
-    #[must_use]
-    fn add(&mut self, deposit: &Deposit) -> bool;
     /// Adds other sums; false, and unchanged, if they do not fit.
     #[must_use]
     fn merge(&mut self, sums: &WideSums) -> bool;
@@ -118,17 +115,8 @@ pub struct Sums(
     [u64; 6],
 );
 
-/// The sums of a cell all of whose deposits have weight 1, 40 bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PlainSums {
-    /// Σ radiance, Σ luminance²: each below 2⁶³.
-    words: [u64; 4],
-    /// Deposits.
-    count: u32,
-}
-
 /// Weight 1 in quanta.
-const PLAIN_WEIGHT: u32 = 1 << WEIGHT_BITS;
+pub(crate) const PLAIN_WEIGHT: u32 = 1 << WEIGHT_BITS;
 
 /// The same sums without a limit: 2⁴⁰ of the largest deposits fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -144,12 +132,6 @@ pub struct WideSums {
 }
 
 impl CellSums for Sums {
-    #[inline]
-    fn add(&mut self, deposit: &Deposit) -> bool {
-        let Deposit { rgb: [r, g, b], square, weight, .. } = *deposit;
-        deposit.narrow() && self.add_words([1, weight.into(), r, g, b, square])
-    }
-
     fn merge(&mut self, sums: &WideSums) -> bool {
         // All that fits is below 2⁶³.
         sums.words().is_some_and(|words| self.add_words(words))
@@ -170,42 +152,6 @@ impl Sums {
         let fits = sum.iter().fold(0, |bits, x| bits | x) < LIMIT;
         if fits {
             self.0 = sum;
-        }
-        fits
-    }
-}
-
-impl CellSums for PlainSums {
-    #[inline]
-    fn add(&mut self, deposit: &Deposit) -> bool {
-        let Deposit { rgb: [r, g, b], square, weight, .. } = *deposit;
-        deposit.narrow() && weight == PLAIN_WEIGHT && self.add_words([r, g, b, square], 1)
-    }
-
-    fn merge(&mut self, sums: &WideSums) -> bool {
-        let plain = WideSums::plain_weight(sums.count) == Some(sums.weight);
-        let count = u32::try_from(sums.count).ok().filter(|_| plain);
-        let Some((count, [_, _, words @ ..])) = count.zip(sums.words()) else { return false };
-        self.add_words(words, count)
-    }
-
-    #[inline]
-    fn wide(&self) -> WideSums {
-        let [r, g, b, square] = self.words.map(u128::from);
-        let count = u64::from(self.count);
-        WideSums { count, weight: count * u64::from(PLAIN_WEIGHT), rgb: [r, g, b], square }
-    }
-}
-
-impl PlainSums {
-    #[inline]
-    fn add_words(&mut self, words: [u64; 4], count: u32) -> bool {
-        // As above.
-        let sum: [u64; 4] = std::array::from_fn(|i| self.words[i].wrapping_add(words[i]));
-        let (count, overflow) = self.count.overflowing_add(count);
-        let fits = !overflow && sum.iter().fold(0, |bits, x| bits | x) < LIMIT;
-        if fits {
-            (self.words, self.count) = (sum, count);
         }
         fits
     }
@@ -279,34 +225,19 @@ mod tests {
         assert_eq!(wide.square, 1 << (36 + 40 + 4 + 33));
     }
 
-    fn fill<S: CellSums + PartialEq>() {
-        let quantum = Quantum::new(1.0);
-        let deposit = quantum.deposit(Vec3::splat(10_000.0), 1.0).unwrap();
-        let (mut sums, mut expected) = (S::default(), WideSums::default());
-        while sums.add(&deposit) {
-            expected.add(&deposit);
+    #[test]
+    fn sums_that_do_not_fit_are_left_alone() {
+        let mut part = WideSums::default();
+        part.add(&Quantum::new(1.0).deposit(Vec3::splat(10_000.0), 1.0).unwrap());
+        let (mut sums, mut expected) = (Sums::default(), WideSums::default());
+        while sums.merge(&part) {
+            expected.merge(&part);
         }
         assert!(expected.count > 0);
         assert_eq!(sums.wide(), expected);
         let before = sums;
         assert!(!sums.merge(&before.wide()));
         assert_eq!(sums, before);
-    }
-
-    #[test]
-    fn sums_that_do_not_fit_are_left_alone() {
-        fill::<Sums>();
-        fill::<PlainSums>();
-    }
-
-    #[test]
-    fn plain_sums_take_what_has_weight_one() {
-        let quantum = Quantum::new(1.0);
-        let (mut plain, mut any) = (PlainSums::default(), Sums::default());
-        let [one, half] = [1.0, 0.5].map(|weight| quantum.deposit(Vec3::splat(3.0), weight).unwrap());
-        assert!(plain.add(&one) && any.add(&one) && !plain.add(&half) && any.add(&half));
-        assert!(!plain.merge(&any.wide()) && plain.merge(&plain.wide()));
-        assert_eq!((plain.wide().count, plain.wide().weight), (2, 2 << WEIGHT_BITS));
     }
 
     proptest! {

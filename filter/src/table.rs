@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use crate::cell::{Cell, PlainCell, WeighedCell};
 use crate::grid::{CellKey, LeafCell};
-use crate::sums::{CellSums, Deposit, PlainSums, Sums, WideSums};
+use crate::sums::{Deposit, WideSums};
 
 /// What cells are found by.
-pub(crate) trait Key: Copy + Eq + Default + Send + Sync {
-    /// What a cell adds up.
-    type Sums: CellSums;
+pub(crate) trait Key: Copy + Eq + Send + Sync {
+    /// What a table holds of a cell.
+    type Cell: Cell<Self>;
     /// Bits that differ between keys, of which the lower 32 count.
     fn hash(&self) -> u64;
     /// The key that cells are sorted by.
@@ -16,7 +17,7 @@ pub(crate) trait Key: Copy + Eq + Default + Send + Sync {
 }
 
 impl Key for CellKey {
-    type Sums = Sums;
+    type Cell = WeighedCell;
     #[inline]
     fn hash(&self) -> u64 {
         CellKey::hash(*self)
@@ -28,7 +29,7 @@ impl Key for CellKey {
 }
 
 impl Key for LeafCell {
-    type Sums = PlainSums;
+    type Cell = PlainCell;
     #[inline]
     fn hash(&self) -> u64 {
         self.quick_hash()
@@ -37,13 +38,6 @@ impl Key for LeafCell {
     fn cell_key(&self) -> CellKey {
         self.key()
     }
-}
-
-/// A cell, 64 bytes; 56 if all its deposits have the same weight.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cell<K: Key> {
-    key: K,
-    sums: K::Sums,
 }
 
 /// Cells are allocated by so many: they never move, and a table of a few hundred wastes little.
@@ -55,9 +49,9 @@ const CHUNK: usize = 16;
 pub(crate) struct Table<K: Key> {
     /// 0 for none, or in the lower bits, as many as index this list, the number of the cell plus one, and above them the
     /// hash of its key: what another cell has taken is passed over without a look at that cell. A power of two of slots,
-    /// at most half of them taken.
+    /// at most three quarters of them taken.
     slots: Vec<u32>,
-    chunks: Vec<Box<[Cell<K>; CHUNK]>>,
+    chunks: Vec<Box<[K::Cell; CHUNK]>>,
     len: usize,
     /// What did not fit into cells, by their numbers.
     wide: BTreeMap<u32, WideSums>,
@@ -79,7 +73,7 @@ impl<K: Key> Table<K> {
     /// The same when the hash is known.
     #[inline]
     pub fn cell_of_hash(&mut self, key: K, hash: u32) -> u32 {
-        if 2 * self.len >= self.slots.len() {
+        if 4 * self.len >= 3 * self.slots.len() {
             self.grow();
         }
         let mask = (self.slots.len() - 1) as u32;
@@ -91,7 +85,7 @@ impl<K: Key> Table<K> {
             }
             if (slot ^ hash) & !mask == 0 {
                 let number = (slot & mask) - 1;
-                if self.at(number).key == key {
+                if self.at(number).is(&key) {
                     return number;
                 }
             }
@@ -104,7 +98,7 @@ impl<K: Key> Table<K> {
     pub fn warm(&self) {
         const LINE: usize = 64 / size_of::<u32>();
         let slots = self.slots.iter().step_by(LINE).fold(0, |sum, slot| sum ^ slot);
-        let cells = self.cells().fold(0, |sum, cell| sum ^ cell.key.hash());
+        let cells = self.cells().fold(0, |sum, cell| sum ^ cell.key().hash());
         std::hint::black_box((slots, cells));
     }
 
@@ -118,21 +112,21 @@ impl<K: Key> Table<K> {
     /// Makes a cell that no slot finds yet.
     fn push(&mut self, key: K) -> u32 {
         if self.len == CHUNK * self.chunks.len() {
-            self.chunks.push(Box::new([Cell::default(); CHUNK]));
+            self.chunks.push(Box::new([K::Cell::default(); CHUNK]));
         }
         let number = self.len as u32;
         self.len += 1;
-        *self.at_mut(number) = Cell { key, sums: K::Sums::default() };
+        *self.at_mut(number) = K::Cell::new(key);
         number
     }
 
     #[cold]
     fn grow(&mut self) {
-        let length = (2 * self.slots.len()).max(64);
+        let length = (2 * self.slots.len()).max(32);
         let mask = length as u32 - 1;
         self.slots = vec![0; length];
         for number in 0..self.len as u32 {
-            let hash = self.at(number).key.hash() as u32;
+            let hash = self.at(number).key().hash() as u32;
             let mut at = hash & mask;
             while self.slots[at as usize] != 0 {
                 at = (at + 1) & mask;
@@ -142,26 +136,26 @@ impl<K: Key> Table<K> {
     }
 
     #[inline]
-    fn at(&self, cell: u32) -> &Cell<K> {
+    fn at(&self, cell: u32) -> &K::Cell {
         &self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
     }
 
     #[inline]
-    fn at_mut(&mut self, cell: u32) -> &mut Cell<K> {
+    fn at_mut(&mut self, cell: u32) -> &mut K::Cell {
         &mut self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
     }
 
     /// Adds a deposit to a cell.
     #[inline]
     pub fn add(&mut self, cell: u32, deposit: &Deposit) {
-        if !self.at_mut(cell).sums.add(deposit) {
+        if !self.at_mut(cell).add(deposit) {
             self.widen(cell).add(deposit);
         }
     }
 
     /// Adds sums to a cell.
     pub fn merge(&mut self, cell: u32, sums: &WideSums) {
-        if !self.at_mut(cell).sums.merge(sums) {
+        if !self.at_mut(cell).merge(sums) {
             self.widen(cell).merge(sums);
         }
     }
@@ -169,19 +163,21 @@ impl<K: Key> Table<K> {
     /// Moves a cell's sums to its wide ones, and returns those.
     #[cold]
     fn widen(&mut self, cell: u32) -> &mut WideSums {
-        let sums = std::mem::take(&mut self.at_mut(cell).sums);
+        let narrow = self.at_mut(cell);
+        let sums = narrow.sums();
+        *narrow = K::Cell::new(narrow.key());
         let wide = self.wide.entry(cell).or_default();
-        wide.merge(&sums.wide());
+        wide.merge(&sums);
         wide
     }
 
-    fn cells(&self) -> impl Iterator<Item = &Cell<K>> + '_ {
+    fn cells(&self) -> impl Iterator<Item = &K::Cell> + '_ {
         self.chunks.iter().flat_map(|chunk| chunk.iter()).take(self.len)
     }
 
     /// All keys, in the order of their cells' numbers.
     pub fn keys(&self) -> impl Iterator<Item = CellKey> + '_ {
-        self.cells().map(|cell| cell.key.cell_key())
+        self.cells().map(|cell| cell.key().cell_key())
     }
 
     /// Number of cells.
@@ -191,12 +187,12 @@ impl<K: Key> Table<K> {
 
     /// Key of a cell.
     pub fn key(&self, cell: u32) -> CellKey {
-        self.at(cell).key.cell_key()
+        self.at(cell).key().cell_key()
     }
 
     /// Sums of a cell.
     pub fn sums(&self, cell: u32) -> WideSums {
-        let mut sums = self.at(cell).sums.wide();
+        let mut sums = self.at(cell).sums();
         if !self.wide.is_empty() {
             if let Some(wide) = self.wide.get(&cell) {
                 sums.merge(wide);
@@ -214,7 +210,7 @@ impl<K: Key> Table<K> {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let chunk = size_of::<Box<[Cell<K>; CHUNK]>>() * self.chunks.capacity();
-        self.slots.capacity() * size_of::<u32>() + self.chunks.len() * CHUNK * size_of::<Cell<K>>() + chunk
+        let chunk = size_of::<Box<[K::Cell; CHUNK]>>() * self.chunks.capacity();
+        self.slots.capacity() * size_of::<u32>() + self.chunks.len() * CHUNK * size_of::<K::Cell>() + chunk
     }
 }

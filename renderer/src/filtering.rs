@@ -181,10 +181,7 @@ impl FrameFilter {
             Sharing::Adaptive(..) => Selection::Primary,
         };
         let most = (TILE * TILE) as usize * (samples.end - samples.start) as usize;
-        let keeper = |mut records: Vec<PathRecord>| {
-            records.reserve_exact(most);
-            Paths { records, selection }
-        };
+        let keeper = |records: Vec<PathRecord>| Paths { records, selection, most };
         records.into_iter().map(keeper).collect()
     }
 
@@ -205,6 +202,17 @@ impl FrameFilter {
             Sharing::Adaptive(adaptive, _) => {
                 adaptive.begin_block(block.start);
                 adaptive.add(records);
+            }
+        }
+    }
+
+    /// The same of the last block of a frame, whose records nobody needs any more.
+    pub fn add_last(&mut self, block: &Range<u64>, records: Vec<Vec<PathRecord>>) {
+        match &mut self.sharing {
+            Sharing::Talk(..) => self.add(block, &records),
+            Sharing::Adaptive(adaptive, _) => {
+                adaptive.begin_block(block.start);
+                adaptive.add_last(records, block.end % self.blocks.epoch == 0);
             }
         }
     }
@@ -358,7 +366,7 @@ pub struct Merging {
     surroundings: Surroundings,
     bounds: Bounds,
     /// Of all bands so far.
-    pixels: Vec<blend::Pixel>,
+    rows: Vec<Vec<blend::Pixel>>,
 }
 
 impl Merging {
@@ -367,7 +375,7 @@ impl Merging {
         let Filtering::Adaptive(_, blend) = *filtering else { return None };
         let measured = aovs.contains(Aov::FilterCell);
         let sums = filter::Merging::new(&filtering.adaptive(surroundings)?, tile_count(bounds), TILE * TILE, measured);
-        Some(Self { sums, blend, surroundings: *surroundings, bounds, pixels: Vec::new() })
+        Some(Self { sums, blend, surroundings: *surroundings, bounds, rows: Vec::new() })
     }
 
     /// Adds the next tiles of a tree: trees in their order, all tiles of each.
@@ -397,16 +405,21 @@ impl Merging {
         let resolved: Vec<Vec<Resolved>> = tiles.into_par_iter().zip(slots).map(of_tile).collect();
         let resolved = resolved.concat();
         // Room for all, but not before the trees are done with theirs.
-        self.pixels.reserve_exact(self.bounds.area() as usize - self.pixels.len());
-        self.pixels.par_extend(blend_pixels(film, &resolved, expose(&self.surroundings)));
+        self.rows.reserve_exact(self.bounds.height() as usize - self.rows.len());
+        let expose = expose(&self.surroundings);
+        self.rows.par_extend(
+            (film.bounds().min[1]..film.bounds().max[1])
+                .into_par_iter()
+                .map(|y| blend_row(film, y, |at| &resolved[film.index(at)], expose)),
+        );
     }
 
     /// Gives the image of all bands its filtered values. `paths` are as [`FrameFilter::paths`] counts them.
     pub fn finish(self, paths: [u64; 2], image: &mut Image) -> Report {
-        let Self { sums, blend, surroundings, bounds, pixels } = self;
+        let Self { sums, blend, surroundings, bounds, rows } = self;
         let report = Report::Adaptive(sums.report(paths));
         drop(sums);
-        let frame = blend::Frame { width: bounds.width() as usize, pixels };
+        let frame = blend::Frame { width: bounds.width() as usize, rows };
         let (values, shares) = blended(frame, &blend, surroundings.unit * COARSE, expose(&surroundings));
         image.set_radiance(&values);
         image.set_channel(Aov::FilterBlend.name(), &shares);
@@ -420,18 +433,15 @@ fn expose(surroundings: &Surroundings) -> impl Fn(Vec3) -> Vec3 + Copy + Send + 
     move |radiance| response * radiance
 }
 
-/// All that is to be blended, row by row, given what each pixel got by its index.
-fn blend_pixels(
+/// All that is to be blended of row `y`, given what each pixel got.
+fn blend_row<'r>(
     film: &Film,
-    resolved: &[Resolved],
-    expose: impl Fn(Vec3) -> Vec3 + Send + Sync,
-) -> impl IndexedParallelIterator<Item = blend::Pixel> {
-    let bounds = film.bounds();
-    let width = bounds.width() as usize;
-    (0..bounds.area() as usize).into_par_iter().map(move |i| {
-        let at = [bounds.min[0] + (i % width) as u32, bounds.min[1] + (i / width) as u32];
-        blend::Pixel::new(film, at, &resolved[film.index(at)], &expose)
-    })
+    y: u32,
+    resolved: impl Fn([u32; 2]) -> &'r Resolved,
+    expose: impl Fn(Vec3) -> Vec3,
+) -> Vec<blend::Pixel> {
+    let columns = film.bounds().min[0]..film.bounds().max[0];
+    columns.map(|x| blend::Pixel::new(film, [x, y], resolved([x, y]), &expose)).collect()
 }
 
 /// The values of the pixels, and the shares of their own, unfiltered ones.
@@ -440,9 +450,9 @@ fn blended(frame: blend::Frame, blend: &Blend, coarse: f32, expose: impl Fn(Vec3
     let coarse = expose(Vec3::splat(coarse)).max_element();
     // At the other end, sums of what fits singly need not fit.
     let usable = |value: Rgb| value.is_finite() && value.max_element() >= coarse;
-    (&mut values, &mut shares, &frame.pixels).into_par_iter().for_each(|(value, share, pixel)| {
+    (&mut values, &mut shares).into_par_iter().enumerate().for_each(|(at, (value, share))| {
         if !usable(*value) {
-            (*value, *share) = (pixel.own(), 1.0);
+            (*value, *share) = (frame.at(at).own(), 1.0);
         }
     });
     (values, shares)
@@ -470,10 +480,23 @@ fn blend_into(
     coarse: f32,
     expose: impl Fn(Vec3) -> Vec3 + Copy + Send + Sync,
 ) {
-    let resolved = by_slot(film, 0, resolved);
+    let Bounds { min, max } = film.bounds();
     let width = film.bounds().width() as usize;
-    let frame = blend::Frame { width, pixels: blend_pixels(film, &resolved, expose).collect() };
-    drop(resolved);
+    let across = width.div_ceil(TILE as usize);
+    // By rows of tiles, and what a tile got is dropped when its pixels have it: so there are pieces of memory that those of
+    // the filter leave room for.
+    let mut tiles = resolved.into_iter();
+    let bands: Vec<Vec<_>> =
+        (min[1]..max[1]).step_by(TILE as usize).map(|_| tiles.by_ref().take(across).collect()).collect();
+    let rows = bands.into_par_iter().enumerate().flat_map_iter(|(band, tiles)| {
+        let base = (band * across) as u32 * TILE * TILE;
+        let mut resolved = vec![Resolved::default(); across * (TILE * TILE) as usize];
+        tiles.into_iter().flatten().for_each(|(slot, value)| resolved[(slot - base) as usize] = value);
+        let top = min[1] + band as u32 * TILE;
+        let row = |y| blend_row(film, y, |at| &resolved[film.index(at) - base as usize], expose);
+        (top..max[1].min(top + TILE)).map(row).collect::<Vec<_>>()
+    });
+    let frame = blend::Frame { width, rows: rows.collect() };
     let (values, shares) = blended(frame, blend, coarse, expose);
     film.set_filtered(&values);
     if film.outputs().aovs.contains(Aov::FilterBlend) {

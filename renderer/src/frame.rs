@@ -295,11 +295,6 @@ impl Accumulation {
         });
         Some((report, past))
     }
-
-    /// Bytes of the sums of pixels.
-    pub fn film_bytes(&self) -> u64 {
-        Film::memory(self.description.bounds, &self.description.outputs(), self.filter.is_some())
-    }
 }
 
 /// The next pass of samples `rest` when `done` are done: short ones first, so that a job that is stopped early has something,

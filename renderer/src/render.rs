@@ -427,16 +427,24 @@ pub fn trace(
     let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
     let Prepared { world, mut statistics, ids, .. } = prepared;
     let ids = ids.as_ref();
-    statistics.film_bytes = frame.film_bytes();
-    match world.geometry.alpha_test(&world.textures) {
+    let last = match world.geometry.alpha_test(&world.textures) {
         None => {
             trace_passes(&world, &Opaque(world.geometry.scene()), ids, &mut frame, &mut statistics, observer, &over)
         }
         Some(alpha) => {
             let queries = AlphaTested { scene: world.geometry.scene(), alpha };
-            trace_passes(&world, &queries, ids, &mut frame, &mut statistics, observer, &over);
+            trace_passes(&world, &queries, ids, &mut frame, &mut statistics, observer, &over)
         }
+    };
+    // The filter is largest at the end, and by then nobody needs the scene any more.
+    drop(world);
+    if let (Some(filter), Some((block, records))) = (&mut frame.filter, last) {
+        let start = Instant::now();
+        filter.add_last(&block, records);
+        statistics.filter_seconds += start.elapsed().as_secs_f64();
+        observer.pass_done(&mut frame);
     }
+    statistics.film_bytes = frame.film.bytes();
     statistics.counters = frame.counters;
     statistics.render_seconds = start.elapsed().as_secs_f64();
     Traced { frame, statistics }
@@ -471,7 +479,11 @@ impl Traced {
     }
 }
 
-/// Traces all passes, filtered or not.
+/// The samples of a block, and its paths by tile.
+type Block = (Range<u64>, Vec<Vec<PathRecord>>);
+
+/// Traces all passes, filtered or not. The last block of a filtered frame is left to be added to the filter; the observer is
+/// to be told of it then.
 fn trace_passes<Q: Queries + Sync>(
     world: &World,
     queries: &Q,
@@ -480,19 +492,24 @@ fn trace_passes<Q: Queries + Sync>(
     statistics: &mut Statistics,
     observer: &dyn Observer,
     over: &dyn Fn() -> bool,
-) {
+) -> Option<Block> {
     let mut rest = frame.samples.missing(&frame.description.asked);
     let progress = Progress::new(&frame.film, &frame.description.asked, rest.start, observer);
     let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), ids, progress };
     while !rest.is_empty() && (frame.samples.count() == 0 || !over()) {
         let pass = frame.pass(&rest);
-        rest.start = passes.trace_pass(&pass, frame, statistics, observer);
+        let last;
+        (rest.start, last) = passes.trace_pass(&pass, frame, statistics, observer);
         statistics.passes += 1;
+        if let Some(records) = last {
+            return Some((pass.start..rest.start, records));
+        }
         observer.pass_done(frame);
         if rest.start < pass.end {
             break;
         }
     }
+    None
 }
 
 /// All that a pass over the frame needs.
@@ -506,14 +523,15 @@ struct Passes<'a, Q> {
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
-    /// Traces a pass, or as much of it as the observer wants; the first sample that was not traced.
+    /// Traces a pass, or as much of it as the observer wants; the first sample that was not traced, and the paths of the last
+    /// block of a filtered frame.
     fn trace_pass(
         &self,
         pass: &Range<u64>,
         frame: &mut Accumulation,
         statistics: &mut Statistics,
         observer: &dyn Observer,
-    ) -> u64 {
+    ) -> (u64, Option<Vec<Vec<PathRecord>>>) {
         let mut records = frame.filter.as_mut().map(FrameFilter::room).unwrap_or_default();
         let mut next = pass.start;
         loop {
@@ -532,13 +550,15 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
                 break;
             }
         }
-        if let Some(filter) = &mut frame.filter {
-            let start = Instant::now();
-            filter.add(&(pass.start..next), &records);
-            filter.set_room(records);
-            statistics.filter_seconds += start.elapsed().as_secs_f64();
+        let Some(filter) = &mut frame.filter else { return (next, None) };
+        if next == frame.description.asked.end {
+            return (next, Some(records));
         }
-        next
+        let start = Instant::now();
+        filter.add(&(pass.start..next), &records);
+        filter.set_room(records);
+        statistics.filter_seconds += start.elapsed().as_secs_f64();
+        (next, None)
     }
 
     /// Adds samples of every pixel to the film, and what a filter is to have of them to `records`, by tile.

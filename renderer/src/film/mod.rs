@@ -42,8 +42,9 @@ pub struct Film {
     pixels: Vec<Pixel>,
     /// What is summed up besides.
     layers: Vec<Layer>,
-    /// Sums of the layers of a pixel, pixel by pixel in the same order.
-    sums: Vec<Sum<3>>,
+    /// Sums of the layers of a tile's pixels, pixel by pixel in the same order. Empty while all of them are zero, as that of
+    /// prefixes is where nothing that shines is seen straight on.
+    sums: Vec<Vec<Sum<3>>>,
     /// What names are kept of.
     named: Vec<Named>,
     /// Names in a pixel, pixel by pixel in the same order.
@@ -65,7 +66,7 @@ pub struct Tile<'a> {
     first: u32,
     pixels: &'a mut [Pixel],
     layers: &'a [Layer],
-    sums: &'a mut [Sum<3>],
+    sums: &'a mut Vec<Sum<3>>,
     named: &'a [Named],
     mattes: &'a mut [Matte],
 }
@@ -78,7 +79,10 @@ pub struct TilePixel<'a> {
     pub index: u32,
     pixel: &'a mut Pixel,
     layers: &'a [Layer],
-    sums: &'a mut [Sum<3>],
+    /// Of its tile.
+    sums: &'a mut Vec<Sum<3>>,
+    /// Where in them its own begin.
+    first_sum: usize,
     named: &'a [Named],
     mattes: &'a mut [Matte],
 }
@@ -88,9 +92,12 @@ impl TilePixel<'_> {
     #[inline]
     pub fn add(&mut self, taken: &Taken<'_>) {
         self.pixel.add(taken);
-        for (layer, sum) in self.layers.iter().zip(self.sums.iter_mut()) {
+        for (at, layer) in (self.first_sum..).zip(self.layers) {
             if !layer.first_hit() || taken.alpha > 0.0 {
-                sum.add(layer.term(taken));
+                let term = layer.term(taken);
+                if term != [0.0; 3] {
+                    present(self.sums, self.layers.len())[at].add(term);
+                }
             }
         }
         if let Some(ids) = taken.seen.and_then(|seen| seen.aside.seen()) {
@@ -99,6 +106,18 @@ impl TilePixel<'_> {
             }
         }
     }
+}
+
+/// Pixels of a tile.
+const TILE_PIXELS: usize = (TILE * TILE) as usize;
+
+/// The sums of so many layers of a tile, which are made if they are not there.
+#[inline]
+fn present(sums: &mut Vec<Sum<3>>, layers: usize) -> &mut [Sum<3>] {
+    if sums.is_empty() {
+        *sums = vec![Sum::default(); TILE_PIXELS * layers];
+    }
+    sums
 }
 
 impl Tile<'_> {
@@ -123,13 +142,14 @@ impl Tile<'_> {
 
     /// The pixel of this number.
     pub fn pixel(&mut self, number: u32) -> TilePixel<'_> {
-        let (i, layers, named) = (number as usize, self.layers.len(), self.named.len());
+        let (i, named) = (number as usize, self.named.len());
         TilePixel {
             at: place(self.origin, number),
             index: self.first + number,
             pixel: &mut self.pixels[i],
             layers: self.layers,
-            sums: &mut self.sums[i * layers..][..layers],
+            sums: self.sums,
+            first_sum: i * self.layers.len(),
             named: self.named,
             mattes: &mut self.mattes[i * named..][..named],
         }
@@ -145,12 +165,15 @@ impl Tile<'_> {
     /// Takes what [`Film::store`] appended for the tile's pixels off the front, and adds their samples. `None`, with some of
     /// them added, where no film has such words.
     pub fn load(&mut self, words: &mut &[u64]) -> Option<()> {
-        let mut sums = self.sums.chunks_exact_mut(self.layers.len().max(1));
+        let layers = self.layers.len();
         let mut mattes = self.mattes.chunks_exact_mut(self.named.len().max(1));
-        for pixel in self.pixels.iter_mut() {
+        for (index, pixel) in self.pixels.iter_mut().enumerate() {
             pixel.merge(&Pixel::load(words)?);
-            for sum in sums.next().unwrap_or_default() {
-                sum.merge(&Sum::load(words)?);
+            for at in index * layers..(index + 1) * layers {
+                let sum = Sum::load(words)?;
+                if sum != Sum::default() {
+                    present(self.sums, layers)[at].merge(&sum);
+                }
             }
             for matte in mattes.next().unwrap_or_default() {
                 matte.merge(&Matte::load(words)?);
@@ -176,14 +199,17 @@ pub fn tile_count(bounds: Bounds) -> usize {
     tiles(bounds).map(|count| count as usize).iter().product()
 }
 
+/// Bytes of a matte of one name besides the matte itself, with what the allocator keeps of its own.
+const MATTE_ENTRY: usize = 32;
+
 impl Film {
     /// An empty film of `resolution` of which the pixels in `bounds` are rendered. A `filtered` one keeps what a filter
     /// needs.
     pub fn new(resolution: [u32; 2], bounds: Bounds, outputs: impl Into<Outputs>, filtered: bool) -> Self {
         let outputs = outputs.into();
-        let (tiles, count) = (tiles(bounds), tile_count(bounds) * (TILE * TILE) as usize);
+        let (tiles, count) = (tiles(bounds), tile_count(bounds) * TILE_PIXELS);
         let layers = outputs.layers(filtered);
-        let (pixels, sums) = (vec![Pixel::default(); count], vec![Sum::default(); count * layers.len()]);
+        let (pixels, sums) = (vec![Pixel::default(); count], vec![Vec::new(); tile_count(bounds)]);
         let named = outputs.mattes();
         let mattes = vec![Matte::default(); count * named.len()];
         let (filtered, maps, errors) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
@@ -210,14 +236,21 @@ impl Film {
         Self { overscan, ..self }
     }
 
-    /// Bytes that a film of this shape holds.
+    /// Bytes that a film of this shape holds if all of its layers are seen in all tiles.
     pub fn memory(bounds: Bounds, outputs: &Outputs, filtered: bool) -> u64 {
         let pixels =
             u64::from(bounds.width().next_multiple_of(TILE)) * u64::from(bounds.height().next_multiple_of(TILE));
         let result = if filtered { size_of::<Rgb>() } else { 0 };
-        // One name each, with what the allocator keeps of its own.
-        let result = result + outputs.mattes().len() * (size_of::<Matte>() + 32);
+        let result = result + outputs.mattes().len() * (size_of::<Matte>() + MATTE_ENTRY);
         pixels * (size_of::<Pixel>() + outputs.layers(filtered).len() * size_of::<Sum<3>>() + result) as u64
+    }
+
+    /// Bytes that it holds, filtered values included where there are layers for them.
+    pub fn bytes(&self) -> u64 {
+        let result = if self.layers.contains(&Layer::Prefix) { size_of::<Rgb>() } else { 0 };
+        let of_pixel = size_of::<Pixel>() + result + self.named.len() * (size_of::<Matte>() + MATTE_ENTRY);
+        let sums: usize = self.sums.iter().map(|sums| sums.capacity() * size_of::<Sum<3>>()).sum();
+        (self.pixels.len() * of_pixel + sums) as u64
     }
 
     /// Width and height of the whole frame.
@@ -248,19 +281,17 @@ impl Film {
     /// All tiles, each independently mutable.
     pub fn tiles(&mut self) -> Vec<Tile<'_>> {
         let (bounds, across, layers) = (self.bounds, self.tiles[0], self.layers.as_slice());
-        let mut sums = self.sums.chunks_mut((TILE * TILE) as usize * layers.len().max(1));
         let named = self.named.as_slice();
-        let mut mattes = self.mattes.chunks_mut((TILE * TILE) as usize * named.len().max(1));
-        self.pixels
-            .chunks_mut((TILE * TILE) as usize)
+        let mut mattes = self.mattes.chunks_mut(TILE_PIXELS * named.len().max(1));
+        (self.pixels.chunks_mut(TILE_PIXELS).zip(&mut self.sums))
             .zip(0u32..)
-            .map(|(pixels, index)| Tile {
+            .map(|((pixels, sums), index)| Tile {
                 origin: [bounds.min[0] + index % across * TILE, bounds.min[1] + index / across * TILE],
                 bounds,
                 first: index * TILE * TILE,
                 pixels,
                 layers,
-                sums: sums.next().unwrap_or_default(),
+                sums,
                 named,
                 mattes: mattes.next().unwrap_or_default(),
             })
@@ -275,7 +306,9 @@ impl Film {
     /// A layer's sum of the pixel at `[x, y]`, if it is kept.
     pub fn layer(&self, layer: Layer, at: [u32; 2]) -> Option<DVec3> {
         let which = self.layers.iter().position(|kept| *kept == layer)?;
-        Some(DVec3::from_array(self.sums[self.index(at) * self.layers.len() + which].value()))
+        let (tile, pixel) = (self.index(at) / TILE_PIXELS, self.index(at) % TILE_PIXELS);
+        let sum = self.sums[tile].get(pixel * self.layers.len() + which);
+        Some(sum.map_or(DVec3::ZERO, |sum| DVec3::from_array(sum.value())))
     }
 
     /// Names in the pixel at `[x, y]`, if they are kept.
@@ -349,7 +382,10 @@ impl Film {
         let (layers, named) = (self.layers.len(), self.named.len());
         for index in range {
             self.pixels[index].store(words);
-            self.sums[index * layers..(index + 1) * layers].iter().for_each(|sum| sum.store(words));
+            match self.sums[index / TILE_PIXELS].get(index % TILE_PIXELS * layers..) {
+                Some(sums) if !sums.is_empty() => sums[..layers].iter().for_each(|sum| sum.store(words)),
+                _ => (0..layers).for_each(|_| Sum::<3>::default().store(words)),
+            }
             self.mattes[index * named..(index + 1) * named].iter().for_each(|matte| matte.store(words));
         }
     }
@@ -365,7 +401,7 @@ impl Film {
         assert!((self.bounds.min[1]..self.bounds.max[1]).contains(&y), "row {y} is outside the film");
         let (x, y) = (x - self.bounds.min[0], y - self.bounds.min[1]);
         let tile = (y / TILE * self.tiles[0] + x / TILE) as usize;
-        tile * (TILE * TILE) as usize + (y % TILE * TILE + x % TILE) as usize
+        tile * TILE_PIXELS + (y % TILE * TILE + x % TILE) as usize
     }
 
     /// Mean radiance over all pixels, film RGB.
@@ -402,6 +438,32 @@ mod tests {
             assert_eq!(film.layer(Layer::Prefix, at).unwrap().x, 0.5 * value);
             assert_eq!(film.layer(Layer::Depth, at).unwrap().x, 2.0);
         }
+    }
+
+    #[test]
+    fn layers_are_kept_where_they_are_seen() {
+        let bounds = Bounds::full([64, 16]);
+        let mut film = Film::new([64, 16], bounds, AovSet::default(), true);
+        let empty = film.bytes();
+        for mut tile in film.tiles() {
+            tile.for_each(|mut pixel| {
+                let lit = pixel.at == [20, 3];
+                pixel.add(&Taken { prefix: if lit { Rgb::ONE } else { Rgb::ZERO }, ..taken(0, Rgb::ONE) });
+            });
+        }
+        assert_eq!(film.bytes() - empty, (TILE_PIXELS * size_of::<Sum<3>>()) as u64);
+        assert!(film.bytes() < Film::memory(bounds, film.outputs(), true));
+        for at in bounds.pixels() {
+            assert_eq!(film.layer(Layer::Prefix, at).unwrap().x, f64::from(u8::from(at == [20, 3])));
+        }
+        // What is stored does not tell, and loading it leaves out what is empty too.
+        let (mut words, mut again) = (Vec::new(), Film::new([64, 16], bounds, AovSet::default(), true));
+        film.store(0..film.slots(), &mut words);
+        assert_eq!(words.len() as u64, Film::stored_words(bounds, film.outputs(), true));
+        let mut rest = words.as_slice();
+        again.tiles().iter_mut().for_each(|tile| tile.load(&mut rest).unwrap());
+        assert!(rest.is_empty() && again.bytes() == film.bytes());
+        assert_eq!(again.layer(Layer::Prefix, [20, 3]), Some(DVec3::ONE));
     }
 
     #[test]

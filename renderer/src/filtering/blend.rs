@@ -47,12 +47,12 @@ pub struct Pixel {
     glossy_noise: Vec3,
 }
 
-/// All pixels, row by row.
+/// All pixels.
 pub struct Frame {
     /// Pixels of a row.
     pub width: usize,
-    /// All pixels.
-    pub pixels: Vec<Pixel>,
+    /// All rows.
+    pub rows: Vec<Vec<Pixel>>,
 }
 
 /// When the unfiltered image is believed. The default is measured, not derived.
@@ -98,31 +98,40 @@ impl Pixel {
 }
 
 impl Frame {
+    /// A pixel by its number, row by row.
+    pub fn at(&self, i: usize) -> &Pixel {
+        &self.rows[i / self.width][i % self.width]
+    }
+
+    /// All pixels, row by row.
+    fn pixels(&self) -> impl IndexedParallelIterator<Item = &Pixel> {
+        (0..self.width * self.rows.len()).into_par_iter().map(|i| self.at(i))
+    }
+
     /// The blended image, and the share of the unfiltered one in each pixel.
     pub fn blend(&self, settings: &Blend) -> (Vec<Rgb>, Vec<f32>) {
-        let sum: f64 = self.pixels.iter().map(|pixel| f64::from(luminance(pixel.own))).sum();
-        let mean = (sum / self.pixels.len().max(1) as f64) as f32;
+        let sum: f64 = self.rows.iter().flatten().map(|pixel| f64::from(luminance(pixel.own))).sum();
+        let mean = (sum / (self.width * self.rows.len()).max(1) as f64) as f32;
         // Errors count relative to brightness, as eyes see them, down to a tenth of the mean. The brightness is that of nine
         // pixels: by its own, an error that brightens would excuse itself.
         let bright = |pixel: &Pixel| Vec2::new(luminance(pixel.base + pixel.glossy), 1.0);
-        let bright = widened(&self.pixels.par_iter().map(bright).collect::<Vec<_>>(), self.width, 1);
+        let bright = widened(&self.pixels().map(bright).collect::<Vec<_>>(), self.width, 1);
         let scale = |bright: Vec2| (bright.x / bright.y).hypot(0.1 * mean).max(f32::MIN_POSITIVE).recip();
         let scales: Vec<f32> = bright.into_par_iter().map(scale).collect();
         let glossy = weights(self, settings.doubt, |i| {
-            let pixel = &self.pixels[i];
+            let pixel = self.at(i);
             let noise = pixel.own_noise.map(|_| pixel.glossy_noise);
             Difference { from_filtered: pixel.glossy_own - pixel.glossy, noise, scale: scales[i] }
         });
-        let filtered: Vec<Vec3> = (self.pixels.par_iter().zip(&glossy))
+        let filtered: Vec<Vec3> = (self.pixels().zip(&glossy))
             .map(|(pixel, &w)| pixel.base + pixel.glossy + w * (pixel.glossy_own - pixel.glossy))
             .collect();
         let whole = weights(self, settings.doubt, |i| {
-            let pixel = &self.pixels[i];
+            let pixel = self.at(i);
             Difference { from_filtered: pixel.own - filtered[i], noise: pixel.own_noise, scale: scales[i] }
         });
-        let blended = (&self.pixels, &filtered, &whole)
-            .into_par_iter()
-            .map(|(pixel, filtered, w)| *filtered + *w * (pixel.own - *filtered));
+        let blended = (self.pixels().zip(&filtered).zip(&whole))
+            .map(|((pixel, filtered), w)| *filtered + *w * (pixel.own - *filtered));
         (blended.collect(), whole)
     }
 }
@@ -244,8 +253,7 @@ impl Level {
 
 /// The unfiltered value's share for each pixel.
 fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sync) -> Vec<f32> {
-    let (width, count) = (frame.width, frame.pixels.len());
-    let height = count / width.max(1);
+    let (width, height) = (frame.width, frame.rows.len());
     let evidence = |i: usize| {
         let neighbour = if i % width + 1 < width { i + 1 } else { i - i.min(1) };
         measure(i).evidence(|| measure(neighbour))
@@ -254,7 +262,7 @@ fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sy
         widening: Widening::new(3_usize.pow(level as u32), height),
         rows: VecDeque::new(),
     });
-    let mut shares = Vec::with_capacity(count);
+    let mut shares = Vec::with_capacity(width * height);
     for begin in (0..height).step_by(ROWS) {
         let rows = (begin..height.min(begin + ROWS)).into_par_iter();
         let pixels: Vec<Vec<_>> = rows.map(|y| (y * width..(y + 1) * width).map(evidence).collect()).collect();

@@ -23,7 +23,7 @@ fn frame(sigma: f32, halves: bool, bias: impl Fn(usize, usize) -> f32) -> Frame 
             ..Pixel::default()
         }
     };
-    Frame { width: SIDE, pixels: (0..SIDE * SIDE).map(pixel).collect() }
+    Frame { width: SIDE, rows: (0..SIDE).map(|y| (y * SIDE..(y + 1) * SIDE).map(pixel).collect()).collect() }
 }
 
 /// Mean squared error of the blend over all pixels.
@@ -92,8 +92,9 @@ fn a_firefly_is_not_taken_for_the_filters_error() {
     let mut frame = frame(0.1, true, |_, _| 0.0);
     let at = 40 * SIDE + 40;
     // In one half of the samples, as any single path is.
-    frame.pixels[at].own += 500.0;
-    *frame.pixels[at].own_noise.as_mut().unwrap() += 500.0;
+    let pixel = &mut frame.rows[at / SIDE][at % SIDE];
+    pixel.own += 500.0;
+    *pixel.own_noise.as_mut().unwrap() += 500.0;
     let value = frame.blend(&Blend::default()).0[at].x;
     assert!((value - 1.0).abs() < 0.05, "{value}");
 }

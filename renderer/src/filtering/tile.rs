@@ -93,12 +93,14 @@ pub struct Paths {
     /// Those with a selected vertex.
     pub records: Vec<PathRecord>,
     pub(super) selection: Selection,
+    /// How many there will be at most.
+    pub(super) most: usize,
 }
 
 impl Paths {
     /// No path yet.
     pub fn new(selection: Selection) -> Self {
-        Self { records: Vec::new(), selection }
+        Self { records: Vec::new(), selection, most: 0 }
     }
 }
 
@@ -110,6 +112,10 @@ impl Keeper for Paths {
     }
     #[inline]
     fn keep(&mut self, cut: &Cut, sample: Keep) -> Rgb {
+        // By the thread that has paths to keep: what it frees it can use again.
+        if self.records.capacity() == self.records.len() {
+            self.records.reserve_exact(self.most);
+        }
         self.records.extend(cut.record(sample.slot, sample.index, sample.weight));
         cut.prefix()
     }
