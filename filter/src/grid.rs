@@ -26,6 +26,8 @@ pub struct CellKey(u128);
 const COORDINATE_BITS: u32 = 21;
 /// A coordinate's bits.
 const COORDINATE: u64 = (1 << COORDINATE_BITS) - 1;
+/// Bits of the level in a key.
+const LEVEL_BITS: u32 = 16;
 const LEVEL_BIAS: i32 = 1 << 14;
 
 impl CellKey {
@@ -73,7 +75,9 @@ impl CellKey {
     /// From [`Self::bits`]; `None` where no cell has these: levels are exponents of f64.
     pub fn from_bits(bits: u128) -> Option<Self> {
         let key = Self(bits);
-        (key.level().abs() <= 1 << 12 && bits as u64 >> (3 * COORDINATE_BITS) == 0).then_some(key)
+        let level = key.level().abs() < LEAF_LEVEL_BIAS;
+        let attributes = key.upper() << LEVEL_BITS >> LEVEL_BITS <= LEAF_ATTRIBUTES;
+        (level && attributes && key.lower() <= MORTON).then_some(key)
     }
 
     /// Level and attributes.

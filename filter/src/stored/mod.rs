@@ -308,14 +308,16 @@ mod tests {
     /// Found by fuzzing: the counts of one cell, stored twice, added up to more than a count that is stored can be.
     #[test]
     fn a_cell_comes_once() {
-        const KEY: u64 = 0x4c4c_4c4c_4c4c_4c4c;
+        const KEY: [u64; 2] = [0x4c4c_4c4c_4c4c_4c4c, 0x4c4c_0004_4c4c_4c4c];
         let sums = [5, 1, 0, 0, 0, 0];
         let cells = |steps: &[[u64; 2]]| {
             let cells = steps.iter().flat_map(|step| [&step[..], &sums].concat());
             load_cells(&mut Words(&[steps.len() as u64].into_iter().chain(cells).collect::<Vec<_>>()))
         };
-        assert_eq!(cells(&[[KEY; 2], [1, 0]]).map(|cells| cells.len()), Ok(2));
-        assert_eq!(cells(&[[KEY; 2], [0, 0]]), Err(StoredError));
-        assert_eq!(cells(&[[KEY; 2], [u64::MAX; 2]]), Err(StoredError));
+        assert_eq!(cells(&[KEY, [1, 0]]).map(|cells| cells.len()), Ok(2));
+        assert_eq!(cells(&[KEY, [0, 0]]), Err(StoredError));
+        // Attributes that no cell has: they would be cut off, and the key be another one's.
+        assert_eq!(cells(&[KEY, [0, 1 << 40]]), Err(StoredError));
+        assert_eq!(cells(&[KEY, [u64::MAX; 2]]), Err(StoredError));
     }
 }

@@ -134,9 +134,14 @@ mod tests {
             let t = refract(w, Vec3::Z, w.z, interface.cos_t, eta);
             prop_assert!((t.length() - 1.0).abs() < 1e-5);
             prop_assert!((t.truncate() * eta + w.truncate()).length() < 1e-5);
+            // The square of a sine is off by a few roundings of 1, and so is that of a cosine, times η² on the way back: near
+            // grazing that is much of it. Reflectance changes by at most 4/a per cosine, a being η cosθₜ and cosθₜ/η.
             let back = dielectric(interface.cos_t, 1.0 / eta);
-            prop_assert!((back.reflectance - interface.reflectance).abs() < 1e-3);
-            prop_assert!((back.cos_t - w.z).abs() < 1e-3);
+            let rounding = 8.0 * f32::EPSILON * (1.0 + eta * eta);
+            let off = rounding / w.z.max(rounding.sqrt());
+            prop_assert!((back.cos_t - w.z).abs() <= off);
+            let steepest = 2.0 * (eta + 1.0 / eta) / interface.cos_t;
+            prop_assert!((back.reflectance - interface.reflectance).abs() <= steepest * off + 8.0 * f32::EPSILON);
         }
     }
 }
