@@ -8,7 +8,7 @@ use crate::grid::{Anchor, Grid, LeafCell, Places};
 use crate::pairs::Lobe as PairLobe;
 use crate::record::{PathRecord, Vertex};
 use crate::second::{self, SecondVertices, Suffixes};
-use crate::shards::ShardedTable;
+use crate::shards::{Means, ShardedTable};
 use crate::shrink::{Estimates, Shrinkage, estimate};
 use crate::sides::Sides;
 use crate::sums::Quantum;
@@ -23,14 +23,10 @@ pub struct Params {
     pub second_trees: u32,
     /// Finest cells at the first vertex are a quarter to one of this wide, in footprints.
     pub leaf: f32,
-    /// The same at the second vertex.
+    /// The same of all cells at the second vertex.
     pub second_leaf: f32,
     /// When differences between cells are believed.
     pub shrinkage: Shrinkage,
-    /// [`Shrinkage::levels`] at the second vertex. What noise is left there is averaged once more at the first vertex, but
-    /// what bias is stays: 3 instead of 5 take 17 and 31 % off the squared error of two scenes at 256 samples and change
-    /// that at 16 by less than 2 %.
-    pub second_levels: u32,
     /// Samples of a slot over which second vertices share; 0: all. Sums of filters that saw different epochs add up to those
     /// of one that saw all; within an epoch each block profits from those before it.
     pub epoch: u64,
@@ -44,9 +40,8 @@ impl Default for Params {
             trees: 4,
             second_trees: 1,
             leaf: 4.0,
-            second_leaf: 1.0,
+            second_leaf: 32.0,
             shrinkage: Shrinkage { certain: 2.5, inherited: 0.125, trusted: 24.0, levels: 8 },
-            second_levels: 3,
             epoch: 0,
             unit: 1.0,
         }
@@ -56,16 +51,16 @@ impl Default for Params {
 impl Params {
     /// Settings for so many samples of each slot, with leaves as fine as they can tell apart and memory allows.
     ///
-    /// Cells that keep their number of samples shrink in area as samples grow. First vertices have most of the memory: of
-    /// theirs the area shrinks with the fourth root of the samples, so memory grows with it, from 16 samples on and down to
-    /// one footprint. Of second vertices there is one epoch at a time: their leaves are as fine as a footprint as soon as
-    /// there are samples enough for cells that coarse ones cannot stand in for. Against leaves of 4 and 16 footprints for any
-    /// number of samples this takes 1 to 18 % off the squared error of six scenes at 16 samples and 6 to 40 % at 256, for
-    /// 1.3 and 1.6 to 2.5 times the memory.
+    /// Bias and noise both vanish if cells shrink as samples grow, but more slowly than they grow in number. First vertices
+    /// have most of the memory: of theirs the area shrinks with the square root of the samples, so memory grows with it, from
+    /// 16 samples on and down to one footprint; against the fourth root this takes up to 13 % off the squared error of seven
+    /// scenes at 64 and 256 samples, at most adds 3 %, and keeps the shade below a plate of glass that is narrower than a
+    /// wider leaf. Of second vertices there is one epoch at a time, which grows with the samples: their area shrinks with
+    /// those, so that a cell keeps its number of paths.
     pub fn for_samples(samples: u64) -> Self {
         let samples = samples as f32;
-        let leaf = (4.0 * (16.0 / samples).sqrt().sqrt().sqrt()).clamp(1.0, 4.0);
-        let second_leaf = (256.0 / (samples * samples)).clamp(1.0, 16.0);
+        let leaf = (4.0 * (16.0 / samples).sqrt().sqrt()).clamp(1.0, 4.0);
+        let second_leaf = (32.0 * (16.0 / samples).sqrt()).clamp(1.0, 32.0);
         Self { leaf, second_leaf, ..Self::default() }
     }
 }
@@ -196,7 +191,7 @@ impl Adaptive {
     /// Adds records that are dropped part by part if they are owned.
     fn add_each<R: AsRef<[PathRecord]> + Send + Sync>(&mut self, parts: Vec<R>, ends: bool) {
         assert_eq!(parts.len(), self.parts.len(), "parts of a block");
-        let (vertices, estimates) = self.share(&parts);
+        let (vertices, means) = self.share(&parts);
         if ends {
             self.report.bytes = self.bytes();
             self.second.iter_mut().for_each(|tree| tree.cells = ShardedTable::default());
@@ -206,29 +201,23 @@ impl Adaptive {
         let unfiltered = (&mut self.parts, parts, vertices).into_par_iter().map_init(
             first::Batch::default,
             |batch, (part, records, vertices)| {
-                part.add(records.as_ref(), &Suffixes::new(&vertices, &estimates), &rules, batch)
+                part.add(records.as_ref(), &Suffixes::new(&vertices, &means), &rules, batch)
             },
         );
         self.report.unfiltered += unfiltered.sum::<u64>();
         self.cells = None;
     }
 
-    /// Deposits a block's second vertices, and estimates all cells of the epoch so far, tree by tree.
-    fn share<R: AsRef<[PathRecord]> + Sync>(&mut self, parts: &[R]) -> (Vec<SecondVertices>, Vec<Estimates>) {
+    /// Deposits a block's second vertices; the means of all cells of the epoch so far, tree by tree.
+    fn share<R: AsRef<[PathRecord]> + Sync>(&mut self, parts: &[R]) -> (Vec<SecondVertices>, Vec<Means>) {
         let (trees, quantum, side) = (&self.second, &self.quantum, self.params.second_leaf);
         let vertices = parts.par_iter().map_init(second::Batch::default, |batch, records| {
             SecondVertices::new(records.as_ref(), trees, side, quantum, batch)
         });
         let vertices = vertices.collect();
-        self.report.second_cells = 0;
-        let mut estimates = Vec::new();
-        let shrinkage = Shrinkage { levels: self.params.second_levels, ..self.params.shrinkage };
-        for tree in trees {
-            let (estimate, cells) = estimate(&tree.cells.tables(), quantum, &shrinkage);
-            estimates.push(estimate);
-            self.report.second_cells += cells;
-        }
-        (vertices, estimates)
+        let means: Vec<Means> = trees.iter().map(|tree| tree.cells.means(quantum)).collect();
+        self.report.second_cells = means.iter().flatten().map(|means| means.len() as u64).sum();
+        (vertices, means)
     }
 
     /// The tables of the first vertices' tree, diffuse and then glossy, by part.

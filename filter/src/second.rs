@@ -5,8 +5,7 @@ use glam::Vec3;
 use crate::adaptive::{Tree, place};
 use crate::grid::{LeafCell, Places};
 use crate::record::{Lobe, PathRecord};
-use crate::shards::ShardedIndex;
-use crate::shrink::Estimates;
+use crate::shards::{Means, ShardedIndex};
 use crate::sums::{Deposit, LUMINANCE, Quantum};
 
 /// The second vertices of a part of a block, which have been deposited in their cells.
@@ -83,29 +82,34 @@ impl Batch {
     }
 }
 
-/// What arrives at the second vertices of a part of a block, filtered.
+/// What arrives at the second vertices of a part of a block: means over their cells.
+///
+/// Whether cells differ by more than noise is not asked here. What is noise is averaged once more at first vertices, and
+/// what is bias is small there, for a first vertex looks at many cells: of five scenes at 1 to 256 samples none was better
+/// by more than 5 % with cells of a footprint that are shrunk towards those around, at eight times the cells and most of the
+/// filter's time.
 pub(crate) struct Suffixes<'a> {
     places: &'a SecondVertices,
     /// Of all cells, tree by tree.
-    estimates: &'a [Estimates],
+    means: &'a [Means],
 }
 
 impl<'a> Suffixes<'a> {
-    /// From the estimates of all cells, tree by tree.
-    pub fn new(places: &'a SecondVertices, estimates: &'a [Estimates]) -> Self {
-        Self { places, estimates }
+    /// From the means of all cells, tree by tree.
+    pub fn new(places: &'a SecondVertices, means: &'a [Means]) -> Self {
+        Self { places, means }
     }
 
     /// What arrives at the second vertex of a path of the part.
     #[inline]
     pub fn get(&self, path: usize, record: &PathRecord) -> Vec3 {
-        let trees = self.estimates.len();
+        let trees = self.means.len();
         let places = &self.places.places[path * trees..(path + 1) * trees];
         if places[0] == ShardedIndex::NONE {
             // A vertex that no cell took keeps its own light.
             return record.suffix.get();
         }
-        let found = places.iter().zip(self.estimates).map(|(place, tree)| Vec3::from_array(place.of(tree)));
+        let found = places.iter().zip(self.means).map(|(place, tree)| Vec3::from_array(place.of(tree)));
         found.sum::<Vec3>() * (trees as f32).recip()
     }
 }

@@ -2,10 +2,15 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use rayon::prelude::*;
+
 use crate::buckets::Buckets;
 use crate::grid::{CellKey, LeafCell};
-use crate::sums::{Deposit, WideSums};
+use crate::sums::{Deposit, Quantum, WideSums};
 use crate::table::Table;
+
+/// Radiance of each cell of each shard.
+pub(crate) type Means = Vec<Vec<[f32; 3]>>;
 
 /// Shards by the upper bits of the hash, each behind a lock that is held for a batch.
 #[derive(Debug)]
@@ -67,6 +72,14 @@ impl ShardedTable {
         self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The mean radiance of each cell, while nobody adds to them.
+    pub fn means(&self, quantum: &Quantum) -> Means {
+        let of_table = |table: &Table<CellKey>| {
+            (0..table.len()).map(|cell| table.sums(cell).mean(quantum).to_array()).collect()
+        };
+        self.tables().par_iter().map(|table| of_table(table)).collect()
+    }
+
     /// Adds sums to a cell.
     pub fn merge(&self, key: CellKey, sums: &WideSums) {
         let hash = key.hash();
@@ -90,9 +103,9 @@ impl ShardedIndex {
     /// The place of no cell.
     pub const NONE: Self = Self { shard: u32::MAX, number: u32::MAX };
 
-    /// The value of its cell among those of all.
+    /// The mean of its cell among those of all.
     #[inline]
-    pub fn of<T: Copy>(self, values: &[Vec<T>]) -> T {
-        values[self.shard as usize][self.number as usize]
+    pub fn of(self, means: &Means) -> [f32; 3] {
+        means[self.shard as usize][self.number as usize]
     }
 }

@@ -31,7 +31,7 @@ use rayon::prelude::*;
 use crate::belief::most_probable;
 use crate::buckets::Buckets;
 use crate::grid::CellKey;
-use crate::sums::{LUMINANCE, Quantum, WideSums};
+use crate::sums::{LUMINANCE, Quantum, WideSums, float};
 use crate::table::{Key, Table};
 
 /// How sure a difference between cells must be to be kept.
@@ -94,16 +94,6 @@ impl Moments {
         let mean = self.luminance();
         (self.square - self.weight * mean * mean).max(0.0)
     }
-}
-
-/// Nearest number; nearly all are short, for which there are instructions.
-#[inline]
-fn float(x: u128) -> f64 {
-    #[cold]
-    fn long(x: u128) -> f64 {
-        x as f64
-    }
-    if x >> 63 == 0 { x as i64 as f64 } else { long(x) }
 }
 
 /// A cell of a level, leaf or not.

@@ -179,6 +179,13 @@ impl WideSums {
         words.iter().all(|x| *x < LIMIT.into()).then(|| words.map(|x| x as u64))
     }
 
+    /// Mean radiance, Σ weight · radiance / Σ weight.
+    #[inline]
+    pub fn mean(&self, quantum: &Quantum) -> Vec3 {
+        let weight = self.weight as f64 * quantum.weight();
+        (DVec3::from_array(self.rgb.map(float)) * quantum.radiance() / weight).as_vec3()
+    }
+
     /// Adds other sums. What others have stored may be of any size.
     pub fn merge(&mut self, other: &Self) {
         self.count = self.count.saturating_add(other.count);
@@ -188,6 +195,16 @@ impl WideSums {
         }
         self.square = self.square.saturating_add(other.square);
     }
+}
+
+/// Nearest number; nearly all are short, for which there are instructions.
+#[inline]
+pub(crate) fn float(x: u128) -> f64 {
+    #[cold]
+    fn long(x: u128) -> f64 {
+        x as f64
+    }
+    if x >> 63 == 0 { x as i64 as f64 } else { long(x) }
 }
 
 #[cfg(test)]

@@ -138,7 +138,6 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
     number!("levels", params.shrinkage.levels: u32, 0, 16),
-    number!("second_levels", params.second_levels: u32, 0, 16),
     number!("doubt", blend.doubt: f32, 0, 1000),
 ];
 
@@ -453,7 +452,6 @@ mod tests {
             ("adaptive", "trees", "8", "9"),
             ("adaptive", "certain", "3.25", "-0.1"),
             ("adaptive", "levels", "0", "1.5"),
-            ("adaptive", "second_levels", "2", "17"),
             ("adaptive", "leaf", "0.5", "0"),
             ("adaptive", "second_leaf", "auto", "-1"),
             ("adaptive", "epoch", "auto", "0"),
