@@ -51,16 +51,17 @@ impl Default for Params {
 impl Params {
     /// Settings for so many samples of each slot, with leaves as fine as they can tell apart and memory allows.
     ///
-    /// Bias and noise both vanish if cells shrink as samples grow, but more slowly than they grow in number. First vertices
-    /// have most of the memory: of theirs the area shrinks with the square root of the samples, so memory grows with it, from
-    /// 16 samples on and down to one footprint; against the fourth root this takes up to 13 % off the squared error of seven
-    /// scenes at 64 and 256 samples, at most adds 3 %, and keeps the shade below a plate of glass that is narrower than a
-    /// wider leaf. Of second vertices there is one epoch at a time, which grows with the samples: their area shrinks with
-    /// those, so that a cell keeps its number of paths.
+    /// Bias vanishes if cells shrink as samples grow, and noise if they shrink more slowly than samples grow in number. The
+    /// side of first vertices' leaves shrinks with the cube root of the samples, from 16 samples on and down to one
+    /// footprint: against the eighth root this takes up to 27 % off the squared error of five scenes at 256 samples and keeps
+    /// the shade below a plate that is narrower than a wider leaf. Of second vertices there is one epoch at a time, which
+    /// grows with the samples, and nothing tells noise from signal: with the root of the samples' cube their cells shrink so
+    /// far that bias is less than half of the error at 1024 samples, where a square root would be better by up to 12 % of
+    /// squared error at 256 samples.
     pub fn for_samples(samples: u64) -> Self {
-        let samples = samples as f32;
-        let leaf = (4.0 * (16.0 / samples).sqrt().sqrt()).clamp(1.0, 4.0);
-        let second_leaf = (32.0 * (16.0 / samples).sqrt()).clamp(1.0, 32.0);
+        let fewer = (16.0 / samples as f32).min(1.0);
+        let leaf = (4.0 * fewer.cbrt()).max(1.0);
+        let second_leaf = (32.0 * (fewer * fewer * fewer).sqrt().sqrt()).max(1.0);
         Self { leaf, second_leaf, ..Self::default() }
     }
 }

@@ -74,9 +74,8 @@ impl ShardedTable {
 
     /// The mean radiance of each cell, while nobody adds to them.
     pub fn means(&self, quantum: &Quantum) -> Means {
-        let of_table = |table: &Table<CellKey>| {
-            (0..table.len()).map(|cell| table.sums(cell).mean(quantum).to_array()).collect()
-        };
+        let of_table =
+            |table: &Table<CellKey>| (0..table.len()).map(|cell| table.sums(cell).mean(quantum).to_array()).collect();
         self.tables().par_iter().map(|table| of_table(table)).collect()
     }
 

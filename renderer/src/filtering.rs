@@ -567,10 +567,10 @@ mod tests {
             _ => unreachable!("the adaptive filter"),
         };
         let mut filtering = Filtering::named("adaptive").unwrap();
-        assert_eq!(leaves(filtering), [1.0, 2.0]);
+        assert_eq!(leaves(filtering), [1.0, 1.0]);
         filtering.set("leaf", "7").unwrap();
-        assert_eq!(leaves(filtering), [7.0, 2.0]);
-        assert_eq!(leaves(filtering.settled(4096)), [7.0, 2.0]);
+        assert_eq!(leaves(filtering), [7.0, 1.0]);
+        assert_eq!(leaves(filtering.settled(4096)), [7.0, 1.0]);
     }
 
     #[test]
