@@ -22,7 +22,6 @@
 //! samples, and three of four of the cells that stand out of flat walls by chance.
 
 use std::borrow::Cow;
-use std::ops::Deref;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::DVec3;
@@ -125,7 +124,7 @@ pub trait Cells {
     fn sums(&self, cell: u32) -> WideSums;
 }
 
-impl<K: Key, T: Deref<Target = Table<K>>> Cells for T {
+impl<K: Key> Cells for &Table<K> {
     fn keys(&self) -> Cow<'_, [CellKey]> {
         Table::keys(self).collect()
     }

@@ -227,6 +227,16 @@ mod tests {
     }
 
     #[test]
+    fn means_are_weighted() {
+        let quantum = Quantum::new(1.0);
+        let mut sums = WideSums::default();
+        for (radiance, weight) in [(Vec3::new(1.0, 2.0, 0.0), 3.0), (Vec3::new(5.0, 0.0, 4.0), 1.0)] {
+            sums.add(&quantum.deposit(radiance, weight).unwrap());
+        }
+        assert_eq!(sums.mean(&quantum), Vec3::new(2.0, 1.5, 1.0));
+    }
+
+    #[test]
     fn two_to_the_33_of_the_largest_deposits_are_summed_exactly() {
         let quantum = Quantum::new(1.0);
         let deposit = quantum.deposit(Vec3::splat(1_048_576.0), 16.0).unwrap();
