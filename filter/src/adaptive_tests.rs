@@ -1,6 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
+use crate::first::first_tree;
 use crate::{Branch, Lobe, Merging, PackedRgb, Slots, StoredError};
 
 const ANCHOR: Anchor = Anchor { origin: DVec3::ZERO, extent: 8.0 };
@@ -220,11 +221,35 @@ fn sides_are_those_of_the_finest_cells() {
 }
 
 #[test]
+fn a_slot_of_one_sample_reads_the_mean_over_trees() {
+    let resolve = |reads: u32, sample: u8| {
+        let mut filter = Adaptive::new(&Params { reads, ..Params::default() }, &ANCHOR, 5);
+        let mut records = block(5, 0);
+        records.iter_mut().flatten().for_each(|record| record.set_sample(sample));
+        filter.add(&records);
+        filter.resolve().concat()
+    };
+    let (one_by_one, all) = ([0, 1, 2, 3].map(|sample| resolve(1, sample)), resolve(4, 0));
+    for (at, (slot, resolved)) in all.iter().enumerate() {
+        let of_trees = one_by_one.each_ref().map(|tree| tree[at].1);
+        for of in [|resolved: &Resolved| resolved.diffuse, |resolved: &Resolved| resolved.glossy] {
+            let mean = of_trees.iter().map(of).sum::<Vec3>() / 4.0;
+            // Throughput is rounded to 2⁻²⁰ in each tree, and radiance is below 16.
+            assert!((of(resolved) - mean).abs().max_element() < 16.0 * 2f32.powi(-20), "{slot}: {of_trees:?}");
+        }
+    }
+    // Slots begin with different trees, each of which is read by some at any sample.
+    let begins_like_the_first = (0..80).filter(|slot| first_tree(*slot, 0, 4, 1) == first_tree(0, 0, 4, 1)).count();
+    assert!((5..40).contains(&begins_like_the_first), "{begins_like_the_first}");
+}
+
+#[test]
 fn leaves_shrink_as_samples_grow() {
     let leaves = |samples| {
         let params = Params::for_samples(samples);
         [params.leaf, params.second_leaf]
     };
+    assert_eq!([0, 1, 2, 3, 4, 8, 9, u64::MAX].map(|n| Params::for_samples(n).reads), [8, 8, 4, 2, 2, 1, 1, 1]);
     assert_eq!(Params::for_samples(16), Params::default());
     let cases = [
         (0, [4.0, 32.0]),

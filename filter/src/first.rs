@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::adaptive::{Params, place};
 use crate::grid::{Grid, LeafCell, Places};
+use crate::hash::mix64;
 use crate::pairs::{Lobe as PairLobe, Pair, Pairs};
 use crate::record::{Lobe, PathRecord};
 use crate::second::Suffixes;
@@ -29,12 +30,8 @@ pub(crate) struct Rules<'a> {
 struct Share {
     /// Number of the path in its batch.
     path: u32,
-    /// The tree that the path reads.
-    tree: u32,
-    /// The cell that it reads, and [`NOWHERE`] if there is none.
-    read: u32,
     bin: u8,
-    /// A tree without a cell was met: the others after it get nothing.
+    /// A tree without a cell was met: the others after it get nothing, and the path reads its own light.
     lost: bool,
     deposit: Deposit,
     throughput: Vec3,
@@ -48,10 +45,19 @@ pub(crate) struct Batch {
     places: Places,
     leaves: Vec<LeafCell>,
     shares: [Vec<Share>; 2],
+    /// The cells that those were put into, by lobe and tree.
+    cells: [Vec<Vec<u32>>; 2],
     /// Paths of which some light went to no cell.
     unfiltered: Vec<u32>,
     /// For the pairs of a block.
     pairs: Vec<Pair>,
+}
+
+impl Rules<'_> {
+    /// How many trees a path reads.
+    fn reads(&self) -> usize {
+        (self.params.reads as usize).clamp(1, self.grids.len())
+    }
 }
 
 impl Part {
@@ -84,8 +90,8 @@ impl Part {
             batch.gather(records, |path| suffixes.get(first + path, &records[path]), rules, &mut self.pairs);
             for (tree, grid) in rules.grids.iter().enumerate() {
                 grid.leaves(&batch.places, &mut batch.leaves);
-                for (shares, cells) in batch.shares.iter_mut().zip(&mut self.cells) {
-                    deposit(shares, &batch.leaves, tree as u32, &mut cells[tree]);
+                for ((shares, cells), table) in batch.shares.iter_mut().zip(&mut batch.cells).zip(&mut self.cells) {
+                    deposit(shares, &batch.leaves, &mut table[tree], &mut cells[tree]);
                 }
             }
             unfiltered += batch.read(records, rules, &mut self.pairs);
@@ -101,18 +107,17 @@ impl Batch {
         self.shares.iter_mut().for_each(Vec::clear);
         self.unfiltered.clear();
         self.places.clear();
+        self.cells.iter_mut().for_each(|cells| cells.resize(rules.grids.len(), Vec::new()));
         let finest = rules.grids[0].finest();
         for (path, record) in records.iter().enumerate() {
             place(&mut self.places, &record.first, rules.params.leaf, finest);
             let (exists, suffix) = (record.first.exists(), suffix(path));
-            let tree = u32::from(record.sample()) % rules.grids.len() as u32;
             let path = path as u32;
             let mut share = |lobe: &Lobe, kind: PairLobe, bin: u8| {
                 let (incident, throughput) = (lobe.incident(suffix), lobe.throughput.get());
                 match rules.quantum.deposit(incident, 1.0).filter(|_| exists) {
                     Some(deposit) => {
-                        let share =
-                            Share { path, tree, read: NOWHERE, bin, lost: false, deposit, throughput, incident };
+                        let share = Share { path, bin, lost: false, deposit, throughput, incident };
                         self.shares[kind as usize].push(share);
                     }
                     None => {
@@ -134,13 +139,21 @@ impl Batch {
 
     /// Says which slots read which cells; how many paths stay unfiltered.
     fn read(&mut self, records: &[PathRecord], rules: &Rules<'_>, pairs: &mut Pairs) -> u64 {
-        for (shares, kind) in self.shares.iter().zip([PairLobe::Diffuse, PairLobe::Glossy]) {
-            for share in shares {
-                let slot = records[share.path as usize].slot;
-                let (throughput, incident) = (share.throughput, share.incident);
-                if share.read == NOWHERE || !pairs.add(slot, kind, share.tree, share.read, throughput) {
+        let (trees, reads) = (rules.grids.len(), rules.reads());
+        let part = (reads as f32).recip();
+        for ((shares, cells), kind) in self.shares.iter().zip(&self.cells).zip([PairLobe::Diffuse, PairLobe::Glossy]) {
+            for (at, share) in shares.iter().enumerate() {
+                let record = &records[share.path as usize];
+                let (slot, throughput) = (record.slot, share.throughput);
+                let first = first_tree(slot, record.sample(), trees, reads);
+                let read = !share.lost
+                    && (first..first + reads).map(|tree| tree % trees).all(|tree| {
+                        // Whether it can be held depends on the throughput alone: it is held of all trees or of none.
+                        pairs.add(slot, kind, tree as u32, cells[tree][at], throughput * part)
+                    });
+                if !read {
                     self.unfiltered.push(share.path);
-                    pairs.add_unfiltered(slot, kind, throughput * incident, rules.quantum);
+                    pairs.add_unfiltered(slot, kind, throughput * share.incident, rules.quantum);
                 }
             }
         }
@@ -150,20 +163,27 @@ impl Batch {
     }
 }
 
-/// Adds shares to their cells of one tree.
-fn deposit(shares: &mut [Share], leaves: &[LeafCell], tree: u32, cells: &mut Table<LeafCell>) {
-    for share in shares {
+/// The first of the trees that a path reads. The samples of a slot take turns, and slots begin anywhere, so that what cells
+/// are wrong by does not show as their shape.
+pub(crate) fn first_tree(slot: u32, sample: u8, trees: usize, reads: usize) -> usize {
+    let turn = mix64(slot.into()) % trees as u64;
+    (turn as usize + reads * usize::from(sample)) % trees
+}
+
+/// Adds shares to their cells of one tree, and says which those are.
+fn deposit(shares: &mut [Share], leaves: &[LeafCell], table: &mut Table<LeafCell>, cells: &mut Vec<u32>) {
+    cells.clear();
+    cells.extend(shares.iter_mut().map(|share| {
         let leaf = leaves[share.path as usize];
-        // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of
-        // those, and the path reads its own light.
-        if !leaf.exists() || share.lost {
-            (share.lost, share.read) = (true, NOWHERE);
-            continue;
+        // A place at the very border of the extent may have cells in some trees only: it is deposited in the first of those.
+        share.lost |= !leaf.exists();
+        if share.lost {
+            return NOWHERE;
         }
-        let cell = cells.cell(leaf.with_bin(share.bin));
-        cells.add(cell, &share.deposit);
-        share.read = if share.tree == tree { cell } else { share.read };
-    }
+        let cell = table.cell(leaf.with_bin(share.bin));
+        table.add(cell, &share.deposit);
+        cell
+    }));
 }
 
 /// No cell's number.

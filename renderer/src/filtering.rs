@@ -35,8 +35,8 @@ pub enum Filtering {
 }
 
 impl Filtering {
-    /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`], see [`filter::Params::for_samples`],
-    /// and an epoch of 0, which becomes an eighth of them, a power of two and at least [`SHORTEST_EPOCH`].
+    /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`] and reads of 0, see
+    /// [`filter::Params::for_samples`], and an epoch of 0, which becomes an eighth of them, a power of two and at least [`SHORTEST_EPOCH`].
     ///
     /// Ranges of whole epochs are filtered alike on one machine and on several, so the epoch is the trade between how much
     /// second vertices share and how many slices a frame can be cut into. Measured against one epoch over all samples, an
@@ -47,6 +47,9 @@ impl Filtering {
             for (leaf, measured) in [(&mut params.leaf, measured.leaf), (&mut params.second_leaf, measured.second_leaf)]
             {
                 *leaf = if *leaf == AUTO { measured } else { *leaf };
+            }
+            if params.reads == 0 {
+                params.reads = measured.reads;
             }
             if params.epoch == 0 {
                 params.epoch = 1 << (spp / 8).max(SHORTEST_EPOCH).ilog2();

@@ -88,6 +88,22 @@ macro_rules! measured {
     };
 }
 
+/// A number from 1 to a largest one, or one that is decided by the frame's samples: 0 until it is.
+macro_rules! count {
+    ($key:literal, $($field:ident).+: $kind:ty, $largest:literal) => {
+        Setting {
+            key: $key,
+            values: concat!("auto or 1 to ", $largest),
+            get: |all| if all.$($field).+ == 0 { "auto".into() } else { all.$($field).+.to_string() },
+            set: |all, text| {
+                let number = text.parse().ok().filter(|value: &$kind| (1..=$largest).contains(value));
+                let value = if text == "auto" { Some(0) } else { number };
+                value.map(|value| all.$($field).+ = value).is_some()
+            },
+        }
+    };
+}
+
 /// Yes or no.
 macro_rules! switch {
     ($key:literal, $($field:ident).+) => {
@@ -121,19 +137,11 @@ struct TalkSettings {
 
 const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     number!("trees", params.trees: u32, 1, 8),
+    count!("reads", params.reads: u32, 8),
     number!("second_trees", params.second_trees: u32, 1, 8),
     measured!("leaf", params.leaf: f32),
     measured!("second_leaf", params.second_leaf: f32),
-    Setting {
-        key: "epoch",
-        values: "auto or 1 to 1000000000",
-        get: |all| if all.params.epoch == 0 { "auto".into() } else { all.params.epoch.to_string() },
-        set: |all, text| {
-            let samples = text.parse().ok().filter(|samples| (1..=1_000_000_000).contains(samples));
-            let value = if text == "auto" { Some(0) } else { samples };
-            value.map(|value| all.params.epoch = value).is_some()
-        },
-    },
+    count!("epoch", params.epoch: u64, 1_000_000_000),
     number!("certain", params.shrinkage.certain: f64, 0, 1000),
     number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),
@@ -335,7 +343,7 @@ impl Filtering {
             "none" => Some(Self::None),
             "talk" => Some(Self::Talk(talk, Selection::default())),
             "adaptive" => {
-                let params = filter::Params { leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
+                let params = filter::Params { reads: 0, leaf: AUTO, second_leaf: AUTO, ..filter::Params::default() };
                 Some(Self::Adaptive(params, Blend::default()))
             }
             _ => None,
