@@ -3,8 +3,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::cell::PlainCell;
 use crate::first::{self, Part, Rules};
-use crate::grid::{Anchor, Grid, LeafCell, Places};
+use crate::grid::{Anchor, Grid, Places};
 use crate::pairs::Lobe as PairLobe;
 use crate::record::{PathRecord, Vertex};
 use crate::second::{self, SecondVertices, Suffixes};
@@ -233,7 +234,7 @@ impl Adaptive {
     }
 
     /// The tables of the first vertices' tree, diffuse and then glossy, by part.
-    fn tables(&self, tree: usize) -> Vec<&Table<LeafCell>> {
+    fn tables(&self, tree: usize) -> Vec<&Table<PlainCell>> {
         let (lobe, tree) = (tree / self.grids.len(), tree % self.grids.len());
         self.parts.iter().map(|part| &part.cells[lobe][tree]).collect()
     }

@@ -2,24 +2,24 @@
 //!
 //! Each number has as many bits as cells usually need; what does not fit is handed on, see [`Cell::add`].
 
-use crate::grid::{CellKey, LeafCell};
+use crate::grid::LeafCell;
 use crate::sums::{Deposit, PLAIN_WEIGHT, WideSums};
 
 /// A cell of a table.
-pub(crate) trait Cell<K>: Copy + Default + Send + Sync {
+pub(crate) trait Cell: Copy + Default + Send + Sync {
     /// An empty one.
-    fn new(key: K) -> Self;
+    fn new(key: LeafCell) -> Self;
     /// What it is found by.
-    fn key(&self) -> K;
+    fn key(&self) -> LeafCell;
     /// Whether this is its key.
-    fn is(&self, key: &K) -> bool;
+    fn is(&self, key: &LeafCell) -> bool;
     /// Adds a deposit; false, and unchanged, if it does not fit.
     #[must_use]
     fn add(&mut self, deposit: &Deposit) -> bool;
     /// Adds sums; false, and unchanged, if they do not fit.
     #[must_use]
     fn merge(&mut self, sums: &WideSums) -> bool;
-    /// Its sums.
+    /// Its sums, of which those that such a cell has not mean nothing.
     fn sums(&self) -> WideSums;
 }
 
@@ -28,10 +28,10 @@ pub(crate) trait Cell<K>: Copy + Default + Send + Sync {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PlainCell([u64; 5]);
 
-/// A cell of deposits of any weight, 48 bytes: as [`PlainCell`], but above Σ weight · radiance is Σ weight, and Σ weight ·
-/// luminance² comes last.
+/// A cell of deposits of any weight of which only the mean counts, 40 bytes: as [`PlainCell`], but without their number, and
+/// above Σ weight · radiance is Σ weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct WeighedCell([u64; 6]);
+pub(crate) struct MeanCell([u64; 5]);
 
 /// Bits of the number of deposits.
 const COUNT_BITS: u32 = 64 - LeafCell::UPPER_BITS;
@@ -88,7 +88,7 @@ fn add_count(upper: u64, count: u64) -> (u64, bool) {
     (upper.wrapping_add(count << LeafCell::UPPER_BITS), fits)
 }
 
-impl Cell<LeafCell> for PlainCell {
+impl Cell for PlainCell {
     #[inline]
     fn new(key: LeafCell) -> Self {
         Self([key.lower(), key.upper(), 0, 0, 0])
@@ -124,56 +124,53 @@ impl Cell<LeafCell> for PlainCell {
     }
 }
 
-impl WeighedCell {
+impl MeanCell {
     #[inline]
-    fn add_words(&mut self, [count, weight, r, g, b, square]: [u64; 6]) -> bool {
-        let [cell, upper, words @ .., own_square] = self.0;
+    fn add_words(&mut self, weight: u64, rgb: [u64; 3]) -> bool {
+        let [cell, upper, words @ ..] = self.0;
         let (own, own_weight) = split(words, WEIGHED_BITS);
-        let (rgb, rgb_fits) = add(own, [r, g, b], WEIGHED_BITS);
+        let (rgb, rgb_fits) = add(own, rgb, WEIGHED_BITS);
         let ([weight], weight_fits) = add([own_weight], [weight], 3 * (64 - WEIGHED_BITS));
-        let ([square], square_fits) = add([own_square], [square], 63);
-        let (count, count_fits) = add_count(upper, count);
-        let fits = rgb_fits & weight_fits & square_fits & count_fits;
+        let fits = rgb_fits & weight_fits;
         if fits {
             let [r, g, b] = join(rgb, weight, WEIGHED_BITS);
-            self.0 = [cell, count, r, g, b, square];
+            self.0 = [cell, upper, r, g, b];
         }
         fits
     }
 }
 
-impl Cell<CellKey> for WeighedCell {
+impl Cell for MeanCell {
     #[inline]
-    fn new(key: CellKey) -> Self {
-        Self([key.lower(), LeafCell::upper_of(key), 0, 0, 0, 0])
+    fn new(key: LeafCell) -> Self {
+        Self([key.lower(), key.upper(), 0, 0, 0])
     }
 
     #[inline]
-    fn key(&self) -> CellKey {
-        LeafCell::key_of(self.0[1] & LeafCell::UPPER, self.0[0])
+    fn key(&self) -> LeafCell {
+        LeafCell::from_parts(self.0[1], self.0[0])
     }
 
     #[inline]
-    fn is(&self, key: &CellKey) -> bool {
-        (self.0[0] ^ key.lower()) | (self.0[1] & LeafCell::UPPER ^ LeafCell::upper_of(*key)) == 0
+    fn is(&self, key: &LeafCell) -> bool {
+        (self.0[0] ^ key.lower()) | (self.0[1] ^ key.upper()) == 0
     }
 
     #[inline]
     fn add(&mut self, deposit: &Deposit) -> bool {
-        let Deposit { rgb: [r, g, b], square, weight, .. } = *deposit;
-        deposit.narrow() && self.add_words([1, weight.into(), r, g, b, square])
+        self.add_words(deposit.weight.into(), deposit.rgb)
     }
 
     fn merge(&mut self, sums: &WideSums) -> bool {
         // All that fits is below 2⁶³.
-        sums.words().is_some_and(|words| self.add_words(words))
+        sums.words().is_some_and(|[_, weight, r, g, b, _]| self.add_words(weight, [r, g, b]))
     }
 
     #[inline]
     fn sums(&self) -> WideSums {
-        let [_, upper, words @ .., square] = self.0;
+        let [_, _, words @ ..] = self.0;
         let (rgb, weight) = split(words, WEIGHED_BITS);
-        WideSums { count: upper >> LeafCell::UPPER_BITS, weight, rgb: rgb.map(u128::from), square: square.into() }
+        WideSums { weight, rgb: rgb.map(u128::from), ..WideSums::default() }
     }
 }
 
@@ -183,54 +180,52 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::grid::CellKey;
     use crate::sums::Quantum;
 
-    fn key() -> CellKey {
-        CellKey::new(-9, 0x7_1234_5678, [-5, 1 << 19, 77])
+    fn key() -> LeafCell {
+        CellKey::new(-9, 0x7_1234_5678, [-5, 1 << 19, 77]).into()
     }
 
     /// Adds a deposit until it does not fit, and says how many did.
-    fn fill<K, C: Cell<K> + PartialEq + std::fmt::Debug>(empty: C, radiance: f32) -> u64 {
+    fn fill<C: Cell + PartialEq + std::fmt::Debug>(radiance: f32) -> u64 {
         let deposit = Quantum::new(1.0).deposit(Vec3::new(radiance, 0.0, 0.5 * radiance), 1.0).unwrap();
-        let (mut cell, mut expected) = (empty, WideSums::default());
-        while cell.add(&deposit) {
-            expected.add(&deposit);
-        }
-        assert_eq!(cell.sums(), expected);
-        let full = cell;
+        let (mut cell, mut count) = (C::new(key()), 0);
         let (mut one, mut none) = (WideSums::default(), WideSums::default());
         one.add(&deposit);
+        while cell.add(&deposit) {
+            count += 1;
+        }
+        assert_eq!(cell.sums().weight, count << 16);
+        assert_eq!(cell.sums().rgb, deposit.rgb.map(|x| u128::from(count * x)));
+        let full = cell;
         assert!(!cell.merge(&one));
-        one.count = u64::MAX;
+        one.weight = u64::MAX;
         assert!(!cell.merge(&one));
         none.merge(&cell.sums());
-        assert!(cell == full && none == expected);
-        expected.count
+        assert!(cell == full && none == full.sums() && cell.key() == key());
+        count
     }
 
     #[test]
     fn sums_that_do_not_fit_are_left_alone() {
-        let [plain, weighed] = [100.0, 1e-3]
-            .map(|x| {
-                let (leaf, key) = (PlainCell::new(key().into()), WeighedCell::new(key()));
-                (fill(leaf, x), fill(key, x))
-            })
-            .map(|(plain, weighed)| [plain, weighed]);
-        // By radiance and square, and by number.
-        assert!(plain[0] > 150 && plain[0] < 200, "{plain:?}");
-        assert!(plain[1] > 40_000, "{plain:?}");
-        assert_eq!(weighed, [(1 << 16) - 1; 2]);
+        // By the square and the number of deposits.
+        let [bright, dark] = [100.0, 1e-3].map(fill::<PlainCell>);
+        assert!(bright > 150 && bright < 200, "{bright}");
+        assert!(dark > 40_000, "{dark}");
+        // By radiance, 2²² units, and by weight, 2²⁰.
+        assert_eq!([4096.0, 1e-3].map(fill::<MeanCell>), [(1 << 10) - 1, (1 << 20) - 1]);
     }
 
     #[test]
     fn plain_cells_take_what_has_weight_one() {
         let quantum = Quantum::new(1.0);
-        let (mut plain, mut any) = (PlainCell::new(key().into()), WeighedCell::new(key()));
+        let (mut plain, mut mean) = (PlainCell::new(key()), MeanCell::new(key()));
         let [one, half] = [1.0, 0.5].map(|weight| quantum.deposit(Vec3::splat(3.0), weight).unwrap());
-        assert!(plain.add(&one) && any.add(&one) && !plain.add(&half) && any.add(&half));
-        assert!(!plain.merge(&any.sums()) && plain.merge(&plain.sums()));
+        assert!(plain.add(&one) && mean.add(&one) && !plain.add(&half) && mean.add(&half));
+        assert!(!plain.merge(&mean.sums()) && plain.merge(&plain.sums()));
         assert_eq!((plain.sums().count, plain.sums().weight), (2, 2 << 16));
-        assert_eq!(any.sums().weight, 3 << 15);
+        assert_eq!(mean.sums().weight, 3 << 15);
     }
 
     proptest! {
@@ -241,22 +236,22 @@ mod tests {
         ) {
             let key = CellKey::new(level, attributes, c.map(|x| x >> 11));
             let quantum = Quantum::new(1.0);
-            let (mut plain, mut weighed) = (PlainCell::new(key.into()), WeighedCell::new(key));
+            let (mut plain, mut mean) = (PlainCell::new(key.into()), MeanCell::new(key.into()));
             let mut expected = [WideSums::default(); 2];
             for (radiance, weight) in deposits {
                 let deposit = |weight| quantum.deposit(Vec3::new(radiance, 1.0, 0.0), weight).unwrap();
                 if plain.add(&deposit(1.0)) {
                     expected[0].add(&deposit(1.0));
                 }
-                if weighed.add(&deposit(weight)) {
-                    expected[1].add(&deposit(weight));
-                }
+                prop_assert!(mean.add(&deposit(weight)));
+                expected[1].add(&deposit(weight));
             }
-            prop_assert_eq!([plain.sums(), weighed.sums()], expected);
-            prop_assert_eq!((plain.key().key(), weighed.key()), (key, key));
-            prop_assert!(plain.is(&key.into()) && weighed.is(&key));
+            prop_assert_eq!(plain.sums(), expected[0]);
+            prop_assert_eq!((mean.sums().weight, mean.sums().rgb), (expected[1].weight, expected[1].rgb));
+            prop_assert_eq!((plain.key().key(), mean.key().key()), (key, key));
+            prop_assert!(plain.is(&key.into()) && mean.is(&key.into()));
             let other = key.parent();
-            prop_assert!(!plain.is(&other.into()) && !weighed.is(&other));
+            prop_assert!(!plain.is(&other.into()) && !mean.is(&other.into()));
         }
     }
 }

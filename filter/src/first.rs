@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::adaptive::{Params, place};
+use crate::cell::PlainCell;
 use crate::grid::{Grid, LeafCell, Places};
 use crate::hash::mix64;
 use crate::pairs::{Lobe as PairLobe, Pair, Pairs};
@@ -15,7 +16,7 @@ use crate::table::Table;
 #[derive(Debug)]
 pub(crate) struct Part {
     /// By lobe and tree.
-    pub cells: [Vec<Table<LeafCell>>; 2],
+    pub cells: [Vec<Table<PlainCell>>; 2],
     pub pairs: Pairs,
 }
 
@@ -49,8 +50,8 @@ pub(crate) struct Batch {
     cells: [Vec<Vec<u32>>; 2],
     /// Paths of which some light went to no cell.
     unfiltered: Vec<u32>,
-    /// For the pairs of a block.
-    pairs: Vec<Pair>,
+    /// For the pairs of a block, and of all blocks.
+    pairs: [Vec<Pair>; 2],
 }
 
 impl Rules<'_> {
@@ -85,7 +86,7 @@ impl Part {
         }
         let mut unfiltered = 0;
         self.cells.iter().flatten().for_each(Table::warm);
-        self.pairs.begin_block(std::mem::take(&mut batch.pairs));
+        self.pairs.begin_block(std::mem::take(&mut batch.pairs[0]));
         for (first, records) in (0..).step_by(Places::MOST).zip(records.chunks(Places::MOST)) {
             batch.gather(records, |path| suffixes.get(first + path, &records[path]), rules, &mut self.pairs);
             for (tree, grid) in rules.grids.iter().enumerate() {
@@ -96,7 +97,7 @@ impl Part {
             }
             unfiltered += batch.read(records, rules, &mut self.pairs);
         }
-        batch.pairs = self.pairs.end_block();
+        batch.pairs[0] = self.pairs.end_block(&mut batch.pairs[1]);
         unfiltered
     }
 }
@@ -171,7 +172,7 @@ pub(crate) fn first_tree(slot: u32, sample: u8, trees: usize, reads: usize) -> u
 }
 
 /// Adds shares to their cells of one tree, and says which those are.
-fn deposit(shares: &mut [Share], leaves: &[LeafCell], table: &mut Table<LeafCell>, cells: &mut Vec<u32>) {
+fn deposit(shares: &mut [Share], leaves: &[LeafCell], table: &mut Table<PlainCell>, cells: &mut Vec<u32>) {
     cells.clear();
     cells.extend(shares.iter_mut().map(|share| {
         let leaf = leaves[share.path as usize];

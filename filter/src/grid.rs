@@ -277,6 +277,11 @@ impl LeafCell {
         self.cell != NO_CELL
     }
 
+    /// Whether it is a cell with nothing in the bits that no cell uses.
+    pub fn is_canonical(&self) -> bool {
+        self.upper <= Self::UPPER && self.cell <= MORTON
+    }
+
     /// The cell of the same place for vertices of attributes that differ by `bin` in their lower bits, which are 0 here.
     #[inline]
     pub fn with_bin(self, bin: u8) -> Self {

@@ -209,14 +209,14 @@ impl Pairs {
         self.block = room;
     }
 
-    /// Ends a block; its memory is for the next one, whosever it is.
-    pub fn end_block(&mut self) -> Vec<Pair> {
+    /// Ends a block; its memory, and that of `room`, are for the next one, whosever it is.
+    pub fn end_block(&mut self, room: &mut Vec<Pair>) -> Vec<Pair> {
         let mut block = std::mem::take(&mut self.block);
         block.sort_unstable_by_key(Pair::order);
         Pair::unite(&mut block);
-        // Only when there is half as much again: that keeps the work per path constant.
-        if self.recent.len() + block.len() >= self.united.len() / 2 {
-            self.unite(&block);
+        // Only when there is as much again: that keeps the work per path constant.
+        if self.recent.len() + block.len() >= self.united.len() {
+            self.unite(&block, room);
         } else {
             self.recent.extend(&block);
         }
@@ -229,7 +229,7 @@ impl Pairs {
     /// Orders the pairs of blocks that have ended.
     pub fn settle(&mut self) {
         if self.recent.len() > 0 {
-            self.unite(&[]);
+            self.unite(&[], &mut Vec::new());
         }
     }
 
@@ -247,7 +247,7 @@ impl Pairs {
     /// Adds others', whose cells have the numbers of the large tables.
     pub fn absorb(&mut self, pairs: impl Iterator<Item = Pair>) {
         self.block.extend(pairs);
-        self.end_block();
+        self.end_block(&mut Vec::new());
     }
 
     /// Adds others' own sums.
@@ -262,16 +262,17 @@ impl Pairs {
     }
 
     /// Adds a sorted block, and all blocks before it, to those that are united.
-    fn unite(&mut self, block: &[Pair]) {
+    fn unite(&mut self, block: &[Pair], pairs: &mut Vec<Pair>) {
         let (united, recent) = (std::mem::take(&mut self.united), std::mem::take(&mut self.recent));
-        let mut pairs = Vec::with_capacity(united.len() + recent.len() + block.len());
+        pairs.clear();
+        pairs.reserve(united.len() + recent.len() + block.len());
         pairs.extend(united.iter().chain(recent.iter()));
         pairs.extend_from_slice(block);
         // The stable sort finds the sorted runs and merges them.
         pairs.sort_by_key(Pair::order);
-        Pair::unite(&mut pairs);
+        Pair::unite(pairs);
         drop((united, recent));
-        self.united.extend(&pairs);
+        self.united.extend(pairs);
     }
 
     /// Number of pairs.

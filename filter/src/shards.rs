@@ -5,7 +5,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use rayon::prelude::*;
 
 use crate::buckets::Buckets;
-use crate::grid::{CellKey, LeafCell};
+use crate::cell::MeanCell;
+use crate::grid::LeafCell;
 use crate::sums::{Deposit, Quantum, WideSums};
 use crate::table::Table;
 
@@ -15,7 +16,7 @@ pub(crate) type Means = Vec<Vec<[f32; 3]>>;
 /// Shards by the upper bits of the hash, each behind a lock that is held for a batch.
 #[derive(Debug)]
 pub(crate) struct ShardedTable {
-    shards: Vec<Mutex<Table<CellKey>>>,
+    shards: Vec<Mutex<Table<MeanCell>>>,
 }
 
 /// Where a cell is.
@@ -39,14 +40,8 @@ impl Default for ShardedTable {
 impl ShardedTable {
     /// Adds deposits to their cells; says by the number of the deposit where those are, in any order.
     pub fn add(&self, deposits: &[(LeafCell, Deposit)], mut found: impl FnMut(usize, ShardedIndex)) {
-        let keys: Vec<(CellKey, u64)> = deposits
-            .iter()
-            .map(|(cell, _)| {
-                let key = cell.key();
-                (key, key.hash())
-            })
-            .collect();
-        let batches = Buckets::new(SHARDS, keys.iter().map(|(_, hash)| (hash >> (64 - SHARD_BITS)) as u32));
+        let hashes: Vec<u64> = deposits.iter().map(|(cell, _)| cell.quick_hash()).collect();
+        let batches = Buckets::new(SHARDS, hashes.iter().map(|hash| shard_of(*hash)));
         for (shard, lock) in (0..).zip(&self.shards) {
             let batch = batches.get(shard as usize);
             if batch.is_empty() {
@@ -54,36 +49,36 @@ impl ShardedTable {
             }
             let mut table = lock.lock().unwrap_or_else(PoisonError::into_inner);
             for &at in batch {
-                let (key, hash) = keys[at as usize];
-                let number = table.cell_of_hash(key, hash as u32);
-                table.add(number, &deposits[at as usize].1);
+                let (cell, deposit) = &deposits[at as usize];
+                let number = table.cell_of_hash(*cell, hashes[at as usize] as u32);
+                table.add(number, deposit);
                 found(at as usize, ShardedIndex { shard, number });
             }
         }
     }
 
     /// The shards while nobody adds to them.
-    pub fn tables(&self) -> Vec<MutexGuard<'_, Table<CellKey>>> {
+    pub fn tables(&self) -> Vec<MutexGuard<'_, Table<MeanCell>>> {
         self.shards.iter().map(|shard| shard.lock().unwrap_or_else(PoisonError::into_inner)).collect()
     }
 
     /// A shard while nobody adds to it.
-    pub fn table(&self, shard: usize) -> MutexGuard<'_, Table<CellKey>> {
+    pub fn table(&self, shard: usize) -> MutexGuard<'_, Table<MeanCell>> {
         self.shards[shard].lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The mean radiance of each cell, while nobody adds to them.
     pub fn means(&self, quantum: &Quantum) -> Means {
         let of_table =
-            |table: &Table<CellKey>| (0..table.len()).map(|cell| table.sums(cell).mean(quantum).to_array()).collect();
+            |table: &Table<MeanCell>| (0..table.len()).map(|cell| table.sums(cell).mean(quantum).to_array()).collect();
         self.tables().par_iter().map(|table| of_table(table)).collect()
     }
 
     /// Adds sums to a cell.
-    pub fn merge(&self, key: CellKey, sums: &WideSums) {
-        let hash = key.hash();
-        let mut table = self.table((hash >> (64 - SHARD_BITS)) as usize);
-        let number = table.cell_of_hash(key, hash as u32);
+    pub fn merge(&self, cell: LeafCell, sums: &WideSums) {
+        let hash = cell.quick_hash();
+        let mut table = self.table(shard_of(hash) as usize);
+        let number = table.cell_of_hash(cell, hash as u32);
         table.merge(number, sums);
     }
 
@@ -96,6 +91,11 @@ impl ShardedTable {
     pub fn bytes(&self) -> usize {
         self.tables().iter().map(|table| table.bytes()).sum()
     }
+}
+
+/// Tables within shards go by the lower bits.
+fn shard_of(hash: u64) -> u32 {
+    (hash >> (64 - SHARD_BITS)) as u32
 }
 
 impl ShardedIndex {

@@ -29,9 +29,10 @@ use rayon::prelude::*;
 
 use crate::belief::most_probable;
 use crate::buckets::Buckets;
+use crate::cell::Cell;
 use crate::grid::CellKey;
 use crate::sums::{LUMINANCE, Quantum, WideSums, float};
-use crate::table::{Key, Table};
+use crate::table::Table;
 
 /// How sure a difference between cells must be to be kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,7 +125,7 @@ pub trait Cells {
     fn sums(&self, cell: u32) -> WideSums;
 }
 
-impl<K: Key> Cells for &Table<K> {
+impl<C: Cell> Cells for &Table<C> {
     fn keys(&self) -> Cow<'_, [CellKey]> {
         Table::keys(self).collect()
     }

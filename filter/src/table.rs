@@ -2,43 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::cell::{Cell, PlainCell, WeighedCell};
+use crate::cell::Cell;
 use crate::grid::{CellKey, LeafCell};
 use crate::sums::{Deposit, WideSums};
-
-/// What cells are found by.
-pub(crate) trait Key: Copy + Eq + Send + Sync {
-    /// What a table holds of a cell.
-    type Cell: Cell<Self>;
-    /// Bits that differ between keys, of which the lower 32 count.
-    fn hash(&self) -> u64;
-    /// The key that cells are sorted by.
-    fn cell_key(&self) -> CellKey;
-}
-
-impl Key for CellKey {
-    type Cell = WeighedCell;
-    #[inline]
-    fn hash(&self) -> u64 {
-        CellKey::hash(*self)
-    }
-    #[inline]
-    fn cell_key(&self) -> CellKey {
-        *self
-    }
-}
-
-impl Key for LeafCell {
-    type Cell = PlainCell;
-    #[inline]
-    fn hash(&self) -> u64 {
-        self.quick_hash()
-    }
-    #[inline]
-    fn cell_key(&self) -> CellKey {
-        self.key()
-    }
-}
 
 /// Cells are allocated by so many: they never move, and a table of a few hundred wastes little.
 const CHUNK: usize = 16;
@@ -46,33 +12,33 @@ const CHUNK: usize = 16;
 /// Cells found by key: open addressing with linear probing over full keys. It grows, so no cell is ever refused, and
 /// nothing depends on who came first but the cells' numbers, which no result may depend on.
 #[derive(Debug)]
-pub(crate) struct Table<K: Key> {
+pub(crate) struct Table<C> {
     /// 0 for none, or in the lower bits, as many as index this list, the number of the cell plus one, and above them the
     /// hash of its key: what another cell has taken is passed over without a look at that cell. A power of two of slots,
     /// at most three quarters of them taken.
     slots: Vec<u32>,
-    chunks: Vec<Box<[K::Cell; CHUNK]>>,
+    chunks: Vec<Box<[C; CHUNK]>>,
     len: usize,
     /// What did not fit into cells, by their numbers.
     wide: BTreeMap<u32, WideSums>,
 }
 
-impl<K: Key> Default for Table<K> {
+impl<C> Default for Table<C> {
     fn default() -> Self {
         Self { slots: Vec::new(), chunks: Vec::new(), len: 0, wide: BTreeMap::new() }
     }
 }
 
-impl<K: Key> Table<K> {
+impl<C: Cell> Table<C> {
     /// Number of the cell of `key`, which is made if there is none.
     #[inline]
-    pub fn cell(&mut self, key: K) -> u32 {
-        self.cell_of_hash(key, key.hash() as u32)
+    pub fn cell(&mut self, key: LeafCell) -> u32 {
+        self.cell_of_hash(key, key.quick_hash() as u32)
     }
 
     /// The same when the hash is known.
     #[inline]
-    pub fn cell_of_hash(&mut self, key: K, hash: u32) -> u32 {
+    pub fn cell_of_hash(&mut self, key: LeafCell, hash: u32) -> u32 {
         if 4 * self.len >= 3 * self.slots.len() {
             self.grow();
         }
@@ -98,25 +64,25 @@ impl<K: Key> Table<K> {
     pub fn warm(&self) {
         const LINE: usize = 64 / size_of::<u32>();
         let slots = self.slots.iter().step_by(LINE).fold(0, |sum, slot| sum ^ slot);
-        let cells = self.cells().fold(0, |sum, cell| sum ^ cell.key().hash());
+        let cells = self.cells().fold(0, |sum, cell| sum ^ cell.key().quick_hash());
         std::hint::black_box((slots, cells));
     }
 
     /// Makes a cell, to be found by a slot.
-    fn make(&mut self, key: K, slot: u32, tag: u32) -> u32 {
+    fn make(&mut self, key: LeafCell, slot: u32, tag: u32) -> u32 {
         let number = self.push(key);
         self.slots[slot as usize] = tag | (number + 1);
         number
     }
 
     /// Makes a cell that no slot finds yet.
-    fn push(&mut self, key: K) -> u32 {
+    fn push(&mut self, key: LeafCell) -> u32 {
         if self.len == CHUNK * self.chunks.len() {
-            self.chunks.push(Box::new([K::Cell::default(); CHUNK]));
+            self.chunks.push(Box::new([C::default(); CHUNK]));
         }
         let number = self.len as u32;
         self.len += 1;
-        *self.at_mut(number) = K::Cell::new(key);
+        *self.at_mut(number) = C::new(key);
         number
     }
 
@@ -126,7 +92,7 @@ impl<K: Key> Table<K> {
         let mask = length as u32 - 1;
         self.slots = vec![0; length];
         for number in 0..self.len as u32 {
-            let hash = self.at(number).key().hash() as u32;
+            let hash = self.at(number).key().quick_hash() as u32;
             let mut at = hash & mask;
             while self.slots[at as usize] != 0 {
                 at = (at + 1) & mask;
@@ -136,12 +102,12 @@ impl<K: Key> Table<K> {
     }
 
     #[inline]
-    fn at(&self, cell: u32) -> &K::Cell {
+    fn at(&self, cell: u32) -> &C {
         &self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
     }
 
     #[inline]
-    fn at_mut(&mut self, cell: u32) -> &mut K::Cell {
+    fn at_mut(&mut self, cell: u32) -> &mut C {
         &mut self.chunks[cell as usize / CHUNK][cell as usize % CHUNK]
     }
 
@@ -165,19 +131,19 @@ impl<K: Key> Table<K> {
     fn widen(&mut self, cell: u32) -> &mut WideSums {
         let narrow = self.at_mut(cell);
         let sums = narrow.sums();
-        *narrow = K::Cell::new(narrow.key());
+        *narrow = C::new(narrow.key());
         let wide = self.wide.entry(cell).or_default();
         wide.merge(&sums);
         wide
     }
 
-    fn cells(&self) -> impl Iterator<Item = &K::Cell> + '_ {
+    fn cells(&self) -> impl Iterator<Item = &C> + '_ {
         self.chunks.iter().flat_map(|chunk| chunk.iter()).take(self.len)
     }
 
     /// All keys, in the order of their cells' numbers.
     pub fn keys(&self) -> impl Iterator<Item = CellKey> + '_ {
-        self.cells().map(|cell| cell.key().cell_key())
+        self.cells().map(|cell| cell.key().key())
     }
 
     /// Number of cells.
@@ -185,12 +151,17 @@ impl<K: Key> Table<K> {
         self.len as u32
     }
 
-    /// Key of a cell.
-    pub fn key(&self, cell: u32) -> CellKey {
-        self.at(cell).key().cell_key()
+    /// What a cell is found by.
+    pub fn leaf(&self, cell: u32) -> LeafCell {
+        self.at(cell).key()
     }
 
-    /// Sums of a cell.
+    /// Key of a cell.
+    pub fn key(&self, cell: u32) -> CellKey {
+        self.at(cell).key().key()
+    }
+
+    /// Sums of a cell, see [`Cell::sums`].
     pub fn sums(&self, cell: u32) -> WideSums {
         let mut sums = self.at(cell).sums();
         if !self.wide.is_empty() {
@@ -210,7 +181,7 @@ impl<K: Key> Table<K> {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let chunk = size_of::<Box<[K::Cell; CHUNK]>>() * self.chunks.capacity();
-        self.slots.capacity() * size_of::<u32>() + self.chunks.len() * CHUNK * size_of::<K::Cell>() + chunk
+        let chunk = size_of::<Box<[C; CHUNK]>>() * self.chunks.capacity();
+        self.slots.capacity() * size_of::<u32>() + self.chunks.len() * CHUNK * size_of::<C>() + chunk
     }
 }

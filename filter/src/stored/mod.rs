@@ -21,10 +21,11 @@ pub use slots::Slots;
 
 use crate::adaptive::{Adaptive, Params};
 use crate::buckets::Buckets;
-use crate::grid::CellKey;
+use crate::cell::Cell;
+use crate::grid::{CellKey, LeafCell};
 use crate::pairs::Pair;
 use crate::sums::WideSums;
-use crate::table::{Key, Table};
+use crate::table::Table;
 
 /// These words are not the sums of such a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -154,7 +155,7 @@ impl Adaptive {
     /// |---|---|
     /// | 1 | tree |
     /// | 1 | number of cells |
-    /// | 7 to 12 | of each: key, low and high; sums as in [`Branch`] |
+    /// | 6 to 9 | of each: level and attributes; coordinates; 2 × Σ weight, + 1 if wide; Σ weight · radiance, of a wide cell in two words each, low and high |
     ///
     /// # Panics
     /// If paths were added since.
@@ -163,8 +164,16 @@ impl Adaptive {
         let table = self.second[*tree].cells.table(*shard);
         words.extend([*tree as u64, cells.len() as u64]);
         for cell in cells.clone() {
-            words.extend(split(table.key(cell).bits()));
-            branch::store_sums(&table.sums(cell), words);
+            let (leaf, sums) = (table.leaf(cell), table.sums(cell));
+            let weight = sums.weight.min(u64::MAX >> 1) << 1;
+            words.extend([leaf.upper(), leaf.lower()]);
+            match sums.words() {
+                Some([_, _, r, g, b, _]) => words.extend([weight, r, g, b]),
+                None => {
+                    words.push(weight | 1);
+                    words.extend(sums.rgb.into_iter().flat_map(split));
+                }
+            }
         }
     }
 
@@ -181,10 +190,21 @@ impl Adaptive {
         let mut words = Words(words);
         let [tree] = words.take()?;
         let tree = usize::try_from(tree).ok().and_then(|tree| self.second.get(tree)).ok_or(StoredError)?;
-        for _ in 0..words.count(7)? {
-            let [low, high] = words.take()?;
-            let key = CellKey::from_bits(join(low, high)).ok_or(StoredError)?;
-            tree.cells.merge(key, &load_sums(&mut words)?);
+        for _ in 0..words.count(6)? {
+            let [upper, lower, weight] = words.take()?;
+            let cell = LeafCell::from_parts(upper, lower);
+            let rgb = match weight & 1 {
+                0 => words.take::<3>()?.map(u128::from),
+                _ => {
+                    let halves = words.take::<6>()?;
+                    [0, 2, 4].map(|at| join(halves[at], halves[at + 1]))
+                }
+            };
+            // Only what has weight has a mean.
+            if weight < 2 || !cell.is_canonical() {
+                return Err(StoredError);
+            }
+            tree.cells.merge(cell, &WideSums { weight: weight >> 1, rgb, ..WideSums::default() });
         }
         words.end()
     }
@@ -227,7 +247,7 @@ struct Order {
 
 impl Order {
     /// Appends a table's cells by key.
-    fn store_cells<K: Key>(&mut self, table: &Table<K>, words: &mut Vec<u64>) {
+    fn store_cells<C: Cell>(&mut self, table: &Table<C>, words: &mut Vec<u64>) {
         self.cells.clear();
         self.cells.extend(table.keys().zip(0..));
         self.cells.sort_unstable_by_key(|(key, _)| *key);

@@ -27,11 +27,12 @@ use crate::world::World;
 pub fn trace<'p, 'w: 'p, Q: Queries, R: Recorder + 'p>(
     world: &'w World,
     queries: &Q,
-    paths: impl Iterator<Item = &'p mut Path<'w, R>>,
+    begun: impl Iterator<Item = &'p mut Path<'w, R>>,
     first_hit: bool,
     counters: &mut Counters,
 ) {
-    let mut paths: Vec<_> = paths.collect();
+    let mut paths = Vec::with_capacity(begun.size_hint().1.unwrap_or_default());
+    paths.extend(begun);
     while !paths.is_empty() {
         // Where the paths go next, the light they run into there, and what is there.
         counters.closest_hit_rays += paths.len() as u64;

@@ -37,7 +37,7 @@ pub use read::Part;
 pub use write::{Written, write};
 
 /// The first bytes; the last is the version.
-const MAGIC: [u8; 8] = *b"TSRpart\x03";
+const MAGIC: [u8; 8] = *b"TSRpart\x04";
 
 /// What keeps a part from being written, read or added.
 #[derive(Debug, thiserror::Error)]
