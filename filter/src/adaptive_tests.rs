@@ -101,6 +101,40 @@ fn what_is_left_at_the_end_is_what_was_there_before() {
 }
 
 #[test]
+fn sums_too_large_for_cells_go_from_epoch_to_epoch() {
+    let of = |samples: std::ops::Range<u64>, filter: &mut Adaptive| {
+        for sample in samples {
+            let mut records = block(5, sample);
+            for record in records.iter_mut().flatten() {
+                // Up to 2²⁰ units each, of weights above 1, and cells hold 2²².
+                record.suffix = PackedRgb::new(record.suffix.get() * 2f32.powi(18));
+                record.diffuse.throughput = PackedRgb::new(record.diffuse.throughput.get() * 64.0);
+            }
+            filter.begin_block(sample);
+            filter.add(&records);
+        }
+    };
+    let params = Params { epoch: 4, ..Params::default() };
+    let [mut whole, mut first, mut second] = [(); 3].map(|()| Adaptive::new(&params, &ANCHOR, 5));
+    of(0..4, &mut whole);
+    of(0..3, &mut first);
+    for (part, words) in stored(&mut first).iter().enumerate() {
+        load(&mut second, part, words).unwrap();
+    }
+    second.begin_stored_epoch(3);
+    let mut wide = 0;
+    for piece in first.epoch() {
+        let mut words = Vec::new();
+        first.store_epoch(&piece, &mut words);
+        wide += words[4] & 1;
+        second.add_epoch(&words).unwrap();
+    }
+    of(3..4, &mut second);
+    assert!(wide > 0);
+    assert_eq!(second.resolve(), whole.resolve());
+}
+
+#[test]
 fn an_epoch_can_be_gone_on_with() {
     let mut whole = Adaptive::new(&Params { epoch: 4, ..Params::default() }, &ANCHOR, 5);
     let mut first = Adaptive::new(&Params { epoch: 4, ..Params::default() }, &ANCHOR, 5);
@@ -119,8 +153,10 @@ fn an_epoch_can_be_gone_on_with() {
     }
     add(&mut second, 3..8);
     assert_eq!(second.resolve(), whole.resolve());
-    // Not a tree; not so many cells; not a key; more than the cells.
-    for (at, value) in [(0, 1), (1, words[1] + 1), (1, words[1] - 1), (3, u64::MAX)] {
+    // Not a tree; not so many cells; not a key, twice; without weight; more than the cells.
+    for (at, value) in
+        [(0, 1), (1, words[1] + 1), (1, words[1] - 1), (2, u64::MAX), (3, u64::MAX), (4, 0), (4, words[4] | 1)]
+    {
         let mut wrong = words.clone();
         wrong[at] = value;
         assert_eq!(filter().add_epoch(&wrong), Err(StoredError), "word {at} is {value}");
