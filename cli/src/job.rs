@@ -9,7 +9,9 @@ use renderer::filtering::Filtering;
 use renderer::render::RenderError;
 use renderer::scene::Severity;
 
-use crate::args::{CompressionKind, EncodingArguments, FilterArguments, FilterKind, MOTION, RenderArguments};
+use crate::args::{
+    CompressionKind, EncodingArguments, FilterArguments, FilterKind, MOTION, QualityArguments, RenderArguments,
+};
 use crate::exit::Failure;
 use crate::frame_name;
 use crate::log::Log;
@@ -116,12 +118,25 @@ pub fn check_outputs(arguments: &RenderArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How the frame is to be filtered.
+/// Whether how many samples the frame will have is decided while it is rendered, once and for all: what is to be added to
+/// other slices or gone on with is a part of a frame of which that is known.
+pub fn is_open(arguments: &RenderArguments) -> bool {
+    let QualityArguments { target_error, noise_threshold, time_limit, sample_range, slice, .. } = &arguments.quality;
+    let cut = sample_range.is_some() || slice.is_some() || is_part(&arguments.output);
+    let limited = time_limit.is_some() && arguments.checkpoint.checkpoint.is_none();
+    !cut && (target_error.is_some() || noise_threshold.is_some() || limited)
+}
+
+/// How the frame is to be filtered. `open`: [`is_open`].
 ///
 /// # Errors
 /// Settings that the filter does not have or does not take.
-pub fn filtering(arguments: &FilterArguments) -> Result<Filtering, Failure> {
-    let Some(alpha) = arguments.temporal else { return filter(arguments.filter, &arguments.filter_set) };
+pub fn filtering(arguments: &FilterArguments, open: bool) -> Result<Filtering, Failure> {
+    let growing = ("growing".to_owned(), "on".to_owned());
+    let before = (open && arguments.filter == FilterKind::Adaptive).then_some(growing);
+    let Some(alpha) = arguments.temporal else {
+        return filter(arguments.filter, &[before.as_slice(), &*arguments.filter_set].concat());
+    };
     if arguments.filter != FilterKind::Talk {
         return Err(Failure::Usage(
             "--temporal moves the averages of --filter talk over the frames of a sequence; other filters take every frame by \

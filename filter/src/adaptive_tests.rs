@@ -302,6 +302,44 @@ fn leaves_shrink_as_samples_grow() {
 }
 
 #[test]
+fn growing_epochs_end_with_twice_the_samples_and_leaves_shrink_with_them() {
+    let params = Params { epoch: 16, growing: true, ..Params::default() };
+    for (epoch, samples) in [(0..16, [0, 7, 15]), (16..32, [16, 20, 31]), (512..1024, [512, 700, 1023])] {
+        for sample in samples {
+            assert_eq!(params.epoch(sample), epoch, "{sample}");
+            let measured = Params::for_samples(epoch.end);
+            assert_eq!(params.leaves(sample), [measured.leaf, measured.second_leaf], "{sample}");
+        }
+    }
+    assert_eq!(params.epoch(u64::MAX), 1 << 63..u64::MAX);
+    assert_eq!(params.leaves(u64::MAX), [1.0; 2]);
+    let even = Params { growing: false, ..params };
+    assert_eq!([even.epoch(15), even.epoch(700), even.epoch(u64::MAX)], [0..16, 688..704, u64::MAX - 15..u64::MAX]);
+    assert_eq!(even.leaves(700), [params.leaf, params.second_leaf]);
+    assert_eq!(Params::default().epoch(u64::MAX), 0..u64::MAX);
+}
+
+#[test]
+fn cells_of_growing_epochs_hold_their_energy() {
+    let growing = Params { epoch: 1, growing: true, leaf: 32.0, ..Params::default() };
+    let mut filter = Adaptive::new(&growing, &ANCHOR, 5);
+    add(&mut filter, 0..16);
+    let (found, mut brought) = (filter.resolve().concat(), [Vec3::ZERO; 2]);
+    for record in (0..16).flat_map(|sample| block(5, sample).concat()) {
+        let suffix = record.suffix.get();
+        brought[0] += record.diffuse.throughput.get() * record.diffuse.incident(suffix);
+        brought[1] += record.glossy.throughput.get() * record.glossy.incident(suffix);
+    }
+    let sum = |of: fn(&Resolved) -> Vec3| found.iter().map(|(_, resolved)| of(resolved)).sum::<Vec3>();
+    // Throughput and light are independent here, and neither deviates by more than 1/√3 of its mean: means over cells change
+    // the sum of 1280 paths by noise of 1/3 / √1280, of which this is five times as much.
+    for (found, brought) in [sum(|resolved| resolved.diffuse), sum(|resolved| resolved.glossy)].into_iter().zip(brought)
+    {
+        assert!(((found - brought) / brought).abs().max_element() < 0.047, "{found} for {brought}");
+    }
+}
+
+#[test]
 fn one_wide_footprint_pools_no_cells_but_its_own() {
     let resolve = |footprint: f32| {
         let mut filter = filter();

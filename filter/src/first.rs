@@ -23,6 +23,8 @@ pub(crate) struct Part {
 /// What all parts deposit by.
 pub(crate) struct Rules<'a> {
     pub params: &'a Params,
+    /// Width of leaves, in footprints.
+    pub leaf: f32,
     pub quantum: &'a Quantum,
     pub grids: &'a [Grid],
 }
@@ -111,7 +113,7 @@ impl Batch {
         self.cells.iter_mut().for_each(|cells| cells.resize(rules.grids.len(), Vec::new()));
         let finest = rules.grids[0].finest();
         for (path, record) in records.iter().enumerate() {
-            place(&mut self.places, &record.first, rules.params.leaf, finest);
+            place(&mut self.places, &record.first, rules.leaf, finest);
             let (exists, suffix) = (record.first.exists(), suffix(path));
             let path = path as u32;
             let mut share = |lobe: &Lobe, kind: PairLobe, bin: u8| {

@@ -43,7 +43,7 @@ impl Filtering {
     /// eighth loses about a tenth of the gain at 16 samples and a fifth at 256.
     pub fn settled(mut self, spp: u64) -> Self {
         if let Self::Adaptive(params, _) = &mut self {
-            let measured = filter::Params::for_samples(spp);
+            let measured = filter::Params::for_samples(if params.growing { FIRST_EPOCH } else { spp });
             for (leaf, measured) in [(&mut params.leaf, measured.leaf), (&mut params.second_leaf, measured.second_leaf)]
             {
                 *leaf = if *leaf == AUTO { measured } else { *leaf };
@@ -52,7 +52,7 @@ impl Filtering {
                 params.reads = measured.reads;
             }
             if params.epoch == 0 {
-                params.epoch = 1 << (spp / 8).max(SHORTEST_EPOCH).ilog2();
+                params.epoch = if params.growing { FIRST_EPOCH } else { 1 << (spp / 8).max(SHORTEST_EPOCH).ilog2() };
             }
         }
         self
@@ -71,12 +71,25 @@ impl Filtering {
         matches!(self, Self::Talk(talk::Params { temporal: Some(_), .. }, _))
     }
 
-    /// Slices of a frame begin and end at multiples of this many samples.
-    pub fn epoch(&self) -> u64 {
+    /// The samples that share with a sample: a slice of a frame that has one of them has all.
+    pub fn epoch(&self, sample: u64) -> Range<u64> {
         match self {
-            Self::None => 1,
-            Self::Talk(..) => u64::MAX,
-            Self::Adaptive(params, _) => params.epoch.max(1),
+            Self::None => sample..sample.saturating_add(1),
+            Self::Talk(..) => 0..u64::MAX,
+            Self::Adaptive(params, _) => params.epoch(sample),
+        }
+    }
+
+    /// Whether a sample shares with none before it.
+    pub fn begins_epoch(&self, sample: u64) -> bool {
+        self.epoch(sample).start == sample
+    }
+
+    /// Slices of a frame begin and end at multiples of so many samples.
+    pub fn slice_unit(&self) -> u64 {
+        match self {
+            Self::Adaptive(params, _) if params.growing => u64::MAX,
+            _ => self.epoch(0).end,
         }
     }
 }
@@ -86,6 +99,9 @@ const AUTO: f32 = 0.0;
 
 /// Shortest epoch that is chosen without being asked for, samples per pixel.
 const SHORTEST_EPOCH: u64 = 4;
+
+/// The first epoch where it is not known how many there will be, samples per pixel.
+const FIRST_EPOCH: u64 = 16;
 
 /// What a filter did.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -155,7 +171,7 @@ impl FrameFilter {
                 Sharing::Adaptive(Box::new(Adaptive::new(&params, anchor, film.tile_count())), blend)
             }
         };
-        let blocks = Blocks { length: block, epoch: filtering.epoch() };
+        let blocks = Blocks { length: block, filtering: *filtering };
         Ok(Some(Self { sharing, coarse: unit * COARSE, blocks, room: vec![Vec::new(); film.tile_count()] }))
     }
 
@@ -215,7 +231,7 @@ impl FrameFilter {
             Sharing::Talk(..) => self.add(block, &records),
             Sharing::Adaptive(adaptive, _) => {
                 adaptive.begin_block(block.start);
-                adaptive.add_last(records, block.end % self.blocks.epoch == 0);
+                adaptive.add_last(records, self.blocks.filtering.begins_epoch(block.end));
             }
         }
     }
@@ -284,7 +300,7 @@ impl FrameFilter {
     /// between epochs.
     pub fn epoch(&self, next: u64) -> Vec<EpochPiece> {
         match &self.sharing {
-            Sharing::Adaptive(adaptive, _) if next % self.blocks.epoch != 0 => adaptive.epoch(),
+            Sharing::Adaptive(adaptive, _) if !self.blocks.filtering.begins_epoch(next) => adaptive.epoch(),
             _ => Vec::new(),
         }
     }
@@ -514,14 +530,14 @@ fn blend_into(
 #[derive(Clone, Copy, Debug)]
 struct Blocks {
     length: u64,
-    epoch: u64,
+    filtering: Filtering,
 }
 
 impl Blocks {
     fn first(self, rest: &Range<u64>) -> Range<u64> {
-        let within = rest.start % self.epoch;
-        let most = (self.length - within % self.length).min(self.epoch - within);
-        rest.start..rest.end.min(rest.start.saturating_add(most))
+        let epoch = self.filtering.epoch(rest.start);
+        let rest_of_length = self.length - (rest.start - epoch.start) % self.length;
+        rest.start..rest.end.min(epoch.end).min(rest.start.saturating_add(rest_of_length))
     }
 }
 
@@ -555,7 +571,7 @@ mod tests {
     fn an_epoch_is_an_eighth_of_the_samples_unless_told() {
         let epoch = |spp, told| {
             let params = filter::Params { epoch: told, ..filter::Params::default() };
-            Filtering::Adaptive(params, Blend::default()).settled(spp).epoch()
+            Filtering::Adaptive(params, Blend::default()).settled(spp).slice_unit()
         };
         for (spp, expected) in [(1, 4), (16, 4), (64, 8), (100, 8), (256, 32), (u64::MAX, 1 << 60)] {
             assert_eq!(epoch(spp, 0), expected, "{spp}");
@@ -578,18 +594,22 @@ mod tests {
 
     #[test]
     fn blocks_of_an_epoch_are_those_of_any_range_of_epochs() {
-        for (length, epoch) in [(4, 16), (4, 6), (16, 4), (1, 1), (8, u64::MAX)] {
+        for (length, epoch, growing) in
+            [(4, 16, false), (4, 6, false), (16, 4, false), (1, 1, false), (8, 0, false), (4, 6, true), (16, 3, true)]
+        {
+            let params = filter::Params { epoch, growing, ..filter::Params::default() };
+            let filtering = Filtering::Adaptive(params, Blend::default());
             let blocks = |mut rest: Range<u64>| {
                 std::iter::from_fn(move || {
-                    let block = Blocks { length, epoch }.first(&rest);
+                    let block = Blocks { length, filtering }.first(&rest);
                     rest.start = block.end;
                     (!block.is_empty()).then_some(block)
                 })
             };
             let whole: Vec<_> = blocks(0..48).collect();
-            assert!(whole.iter().all(|block| block.start / epoch == (block.end - 1) / epoch), "{whole:?}");
+            assert!(whole.iter().all(|block| params.epoch(block.start) == params.epoch(block.end - 1)), "{whole:?}");
             assert_eq!(whole.iter().map(|block| block.end - block.start).sum::<u64>(), 48);
-            for cut in (0..48).step_by(epoch.min(48) as usize) {
+            for cut in (0..48).filter(|sample| filtering.begins_epoch(*sample)) {
                 let parts: Vec<_> = blocks(0..cut).chain(blocks(cut..48)).collect();
                 assert_eq!(parts, whole, "cut at {cut}");
             }

@@ -78,7 +78,7 @@ impl Slice {
         let Self { index, count } = self;
         let epochs = spp.div_ceil(epoch);
         if index >= count || count > epochs {
-            return Err(RenderError::Slice { slice: self, spp, epoch, epochs });
+            return Err(RenderError::Slice { slice: self, spp, epoch: epoch.min(spp), epochs });
         }
         let first = |k: u64| (u128::from(epochs) * u128::from(k) / u128::from(count)) as u64;
         let border = |k: u64| first(k).saturating_mul(epoch);
@@ -167,7 +167,7 @@ pub enum RenderError {
     /// There is no such slice.
     #[error(
         "there is no slice {}/{}: slices count from 0, and {spp} samples that share by {epoch} make at most {epochs} slices; \
-         take fewer slices, more samples, or --filter-set epoch=N with a smaller N", slice.index, slice.count
+         take fewer slices, more samples, or --filter-set epoch=N with a smaller N and growing=off", slice.index, slice.count
     )]
     Slice {
         /// The slice.
@@ -319,7 +319,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     job.filtering.validate()?;
     let filtering = job.filtering.settled(spp);
     let asked = match job.slice {
-        Some(slice) => slice.samples(spp, filtering.epoch())?,
+        Some(slice) => slice.samples(spp, filtering.slice_unit())?,
         None => job.sample_range.clone().unwrap_or(0..spp),
     };
     if asked.is_empty() {

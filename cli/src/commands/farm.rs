@@ -122,7 +122,7 @@ impl<'a> Sequence<'a> {
             Failure::Usage(format!("the options after -- cannot be given to every render: {}", message.trim_end()))
         })?;
         let Command::Render(render) = parsed.command else { unreachable!("the first word is \"render\"") };
-        job::filtering(&render.filter)?;
+        job::filtering(&render.filter, false)?;
         let refuse = |option, why| Err(Failure::Usage(format!("{option} cannot be given to slices: {why}")));
         if render.quality.time_limit.is_some() {
             return refuse("--time-limit", "a slice that stops early leaves a gap which no merge can fill");

@@ -150,6 +150,10 @@ fn parts_that_do_not_make_a_frame_are_refused_by_name() {
     let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--spp", "16", "--slice", "4/7"]);
     assert_eq!(run.code, 2);
     assert!(run.stderr.contains("at most 4 slices") && run.stderr.contains("epoch"), "{}", run.stderr);
+    let growing = ["--filter-set", "growing=on", "--spp", "64", "--slice", "0/2"];
+    let run = bench.run(&[&["render", "scene.pbrt", "-o", "x.part"], &growing[..]].concat());
+    assert_eq!(run.code, 2);
+    assert!(run.stderr.contains("at most 1 slices") && run.stderr.contains("growing=off"), "{}", run.stderr);
     let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--filter", "talk"]);
     assert_eq!(run.code, 2);
     assert!(run.stderr.contains("talk"), "{}", run.stderr);
@@ -196,8 +200,14 @@ fn frames_of_any_number_of_samples_merge() {
 /// Within an epoch, and with no checkpoint due before the time was over.
 #[test]
 fn what_a_limit_of_time_ends_can_be_gone_on_with() {
+    for growing in ["growing=off", "growing=on,epoch=100"] {
+        what_ends_early_can_be_gone_on_with(growing);
+    }
+}
+
+fn what_ends_early_can_be_gone_on_with(growing: &str) {
     let bench = bench();
-    let job = ["render", "scene.pbrt", "--spp", "2048", "--aov", "all", "--progress", "none"];
+    let job = ["render", "scene.pbrt", "--spp", "2048", "--aov", "all", "--progress", "none", "--filter-set", growing];
     let kept = ["--checkpoint", "a.checkpoint", "-o", "a.exr"];
     let run = bench.succeed(&[&job[..], &kept, &["--time-limit", "0.000001s"]].concat());
     assert!(run.stderr.contains("64 of 2048") && run.stderr.contains("goes on from the checkpoint"), "{}", run.stderr);

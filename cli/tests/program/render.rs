@@ -325,6 +325,28 @@ fn names_in_a_scene_cannot_forge_progress() {
     }
 }
 
+/// Cells are chosen by the samples that there are, not by the most that there may be.
+#[test]
+fn a_frame_that_ends_at_a_target_does_not_depend_on_the_most_samples() {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", SCENE);
+    let render = |options: &[&str]| bench.succeed(&[&["render", "scene.pbrt", "--progress", "none"], options].concat());
+    for spp in ["100", "4096"] {
+        render(&["--target-error", "0.02", "--spp", spp, "-o", &format!("{spp}.exr")]);
+    }
+    let [few, many] = ["100.exr", "4096.exr"].map(|name| read(&bench.path(name)));
+    assert!(few.pixels == many.pixels);
+    let Some(oiio::Attribute::Int(samples)) = many.attribute("samplesPerPixel") else { panic!("no number of samples") };
+    assert!(*samples < 100, "{samples}");
+    let range = format!("0:{samples}");
+    render(&["--sample-range", &range, "--spp", "4096", "--filter-set", "growing=on", "-o", "range.exr"]);
+    assert!(read(&bench.path("range.exr")).pixels == many.pixels);
+    // Who says otherwise is heeded.
+    let told = ["--target-error", "0.02", "--spp", "4096", "--filter-set", "growing=off", "-o", "off.exr"];
+    render(&told);
+    assert!(read(&bench.path("off.exr")).pixels != many.pixels);
+}
+
 #[test]
 fn a_render_knows_its_error_and_stops_at_a_target() {
     let bench = Bench::new();

@@ -142,6 +142,7 @@ const ADAPTIVE: &[Setting<AdaptiveSettings>] = &[
     measured!("leaf", params.leaf: f32),
     measured!("second_leaf", params.second_leaf: f32),
     count!("epoch", params.epoch: u64, 1_000_000_000),
+    switch!("growing", params.growing),
     number!("certain", params.shrinkage.certain: f64, 0, 1000),
     number!("inherited", params.shrinkage.inherited: f64, 0, 1),
     number!("trusted", params.shrinkage.trusted: f64, 1, 1000000),

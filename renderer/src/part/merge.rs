@@ -268,10 +268,12 @@ fn check(before: &[Part], part: &Part, samples: &mut Samples) -> Result<(), Part
             return Err(PartError::Overlap { paths: both(other), samples });
         }
     }
-    let (epoch, spp) = (description.filtering.epoch(), description.spp);
     let mut cuts = part.samples.ranges().iter().flat_map(|range| [range.start, range.end]);
-    match cuts.find(|sample| sample % epoch != 0 && *sample != spp) {
-        Some(end) => Err(PartError::Unfinished { path: part.path.clone(), end, epoch }),
+    match cuts.find(|sample| !description.filtering.begins_epoch(*sample) && *sample != description.spp) {
+        Some(end) => {
+            let epoch = description.filtering.epoch(end);
+            Err(PartError::Unfinished { path: part.path.clone(), end, epoch: epoch.end - epoch.start })
+        }
         None => Ok(()),
     }
 }

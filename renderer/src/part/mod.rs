@@ -150,7 +150,7 @@ fn runs(description: &FrameDescription) -> usize {
 /// The sample after the last, if it shares with those before it.
 fn unfinished(description: &FrameDescription, samples: &Samples) -> Option<u64> {
     let next = samples.ranges().last().map_or(0, |range| range.end);
-    (next % description.filtering.epoch() != 0 && next != description.spp).then_some(next)
+    (!description.filtering.begins_epoch(next) && next != description.spp).then_some(next)
 }
 
 /// Tiles in batches of so many.

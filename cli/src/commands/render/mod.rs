@@ -80,7 +80,7 @@ fn render(
     let begin = Instant::now();
     job::check_samples(arguments)?;
     job::check_outputs(arguments)?;
-    let filtering = job::filtering(&arguments.filter)?;
+    let filtering = job::filtering(&arguments.filter, job::is_open(arguments))?;
     job::check_sequence(arguments, &filtering)?;
     let path = job::output(arguments)?;
     let named = |path: &Path| job::named(path, arguments.frame.unwrap_or(1));
