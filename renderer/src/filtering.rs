@@ -36,14 +36,16 @@ pub enum Filtering {
 
 impl Filtering {
     /// With what depends on the frame's samples per pixel decided: leaves of [`AUTO`] and reads of 0, see
-    /// [`filter::Params::for_samples`], and an epoch of 0, which becomes an eighth of them, a power of two and at least [`SHORTEST_EPOCH`].
+    /// [`filter::Params::for_samples`], and an epoch of 0, which becomes an eighth of them, a power of two and at least
+    /// [`SHORTEST_EPOCH`]. Of a growing frame `spp` is the most that there may be, and these are for its first epoch, of
+    /// [`FIRST_EPOCH`] samples.
     ///
     /// Ranges of whole epochs are filtered alike on one machine and on several, so the epoch is the trade between how much
     /// second vertices share and how many slices a frame can be cut into. Measured against one epoch over all samples, an
     /// eighth loses about a tenth of the gain at 16 samples and a fifth at 256.
     pub fn settled(mut self, spp: u64) -> Self {
         if let Self::Adaptive(params, _) = &mut self {
-            let measured = filter::Params::for_samples(if params.growing { FIRST_EPOCH } else { spp });
+            let measured = filter::Params::for_samples(if params.growing { spp.min(FIRST_EPOCH) } else { spp });
             for (leaf, measured) in [(&mut params.leaf, measured.leaf), (&mut params.second_leaf, measured.second_leaf)]
             {
                 *leaf = if *leaf == AUTO { measured } else { *leaf };
@@ -590,6 +592,25 @@ mod tests {
         filtering.set("leaf", "7").unwrap();
         assert_eq!(leaves(filtering), [7.0, 1.0]);
         assert_eq!(leaves(filtering.settled(4096)), [7.0, 1.0]);
+    }
+
+    #[test]
+    fn where_samples_are_not_known_settings_are_those_of_the_first_epoch() {
+        let settled = |spp: u64, settings: &[&str]| {
+            let mut filtering = Filtering::named("adaptive").unwrap();
+            settings.iter().for_each(|key| filtering.set(key, "on").unwrap());
+            filtering.settled(spp)
+        };
+        let (known, growing) = (settled(16, &[]), settled(4096, &["growing"]));
+        let different =
+            known.settings().into_iter().zip(growing.settings()).filter(|(known, growing)| known != growing);
+        assert_eq!(
+            different.map(|(_, growing)| growing).collect::<Vec<_>>(),
+            [("epoch", "16".to_owned()), ("growing", "on".to_owned())]
+        );
+        assert_eq!(growing, settled(100, &["growing"]));
+        // Unless it is known that there are fewer.
+        assert!(settled(2, &["growing"]).settings().contains(&("reads", "4".to_owned())));
     }
 
     #[test]
