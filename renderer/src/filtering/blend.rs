@@ -6,7 +6,9 @@
 //! heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
 //! has wrong. But where light is rare a few pixels may all have missed it, and seem to be without noise: the variance counts
 //! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it all,
-//! spread over all nine; and [`SCATTER`] of the scatter between pixels is added to it.
+//! spread over all nine; where there is none at all, as a ninth of what it counts as there, from window to window; and
+//! [`SCATTER`] of the scatter between pixels is added to it. (From window to window in all cases it would be too much: in
+//! veach-mis, whose dark plates lie beside noisy ones, the gain at one sample fell by two thirds.)
 //!
 //! Windows are nested, each thrice the side of the next. From the widest to the narrowest, a window's mean e and standard
 //! error s are weighed by [`most_probable`] against what is believed of the window around it, or the lower confidence bound
@@ -201,23 +203,42 @@ impl Difference {
     }
 }
 
+/// Means over a window, of which some may be what wider windows say.
+#[derive(Clone, Copy, Default)]
+struct Variance {
+    /// Of the squared error of the filtered value.
+    doubt: f64,
+    /// Of the unfiltered value.
+    noise: f64,
+}
+
 /// How much of the scatter between pixels counts as doubt. All of it would, were all errors of a window the same; but one
 /// pixel of nine that is wrong, at three standard errors, is certain only with less than an eighth.
 const SCATTER: f64 = 0.1;
 
 impl Evidence {
-    /// Mean squared error of the filtered value, and the standard error of this mean, in view of a wider window.
-    fn error(&self, wider: Option<&Self>) -> [f64; 2] {
-        let mean = |evidence: &Self, sum: f32| f64::from(sum) / f64::from(evidence.count);
-        let error = mean(self, self.error);
-        let scatter = (mean(self, self.square) - error * error).max(0.0);
-        let doubt = mean(self, self.doubt).max(wider.map_or(0.0, |wider| mean(wider, wider.doubt) / 9.0));
-        [error, ((doubt + SCATTER * scatter) / f64::from(self.count)).sqrt()]
+    /// Mean squared error of the filtered value, and the standard error of this mean where the pixels have these variances.
+    fn error(&self, variance: &Variance) -> [f64; 2] {
+        let mean = |sum: f32| f64::from(sum) / f64::from(self.count);
+        let error = mean(self.error);
+        let scatter = (mean(self.square) - error * error).max(0.0);
+        [error, ((variance.doubt + SCATTER * scatter) / f64::from(self.count)).sqrt()]
     }
 
-    /// Mean squared error of the unfiltered value.
-    fn noise(&self) -> f64 {
-        f64::from(self.noise / self.count)
+    /// What variances count as, in view of the wider window and of what they count as there.
+    fn variance(&self, wider: Option<(&Self, Variance)>) -> Variance {
+        let counts = |of: fn(&Self) -> f32, known: fn(&Variance) -> f64| {
+            let seen = |window: &Self| f64::from(of(window) / window.count);
+            match (seen(self), wider) {
+                (0.0, Some((_, wider))) => known(&wider) / 9.0,
+                (own, Some((wider, _))) => own.max(seen(wider) / 9.0),
+                (own, None) => own,
+            }
+        };
+        Variance {
+            doubt: counts(|window| window.doubt, |variance| variance.doubt),
+            noise: counts(|window| window.noise, |variance| variance.noise),
+        }
     }
 }
 
@@ -287,14 +308,16 @@ fn weights(frame: &Frame, doubt: f32, measure: impl Fn(usize) -> Difference + Sy
 
 /// The unfiltered value's share for a pixel from its windows, from narrow to wide.
 fn share(windows: [&Evidence; LEVELS], doubt: f64) -> f32 {
-    let mut believed = 0.0;
-    for (level, window) in windows.iter().enumerate().rev() {
-        let [error, standard_error] = window.error(windows.get(level + 1).copied());
+    let (mut believed, mut wider, mut noise) = (0.0, None, 0.0);
+    for (level, window) in windows.into_iter().enumerate().rev() {
+        let variance = window.variance(wider);
+        wider = Some((window, variance));
+        let [error, standard_error] = window.error(&variance);
         let doubt = if level == 0 { 1.5 * doubt } else { doubt };
         believed = most_probable(error, standard_error, believed).max(error - doubt * standard_error);
+        // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
+        noise = if level == 1 { variance.noise } else { noise };
     }
-    // The noise of nine pixels may miss all that is bright; that of 81 is less likely to.
-    let noise = windows[1].noise();
     let bias = believed * (1.0 + GRAVITY * SEEN / (SEEN + noise));
     if bias > 0.0 { (bias / (bias + noise)) as f32 } else { 0.0 }
 }

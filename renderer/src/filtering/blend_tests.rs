@@ -99,6 +99,24 @@ fn a_firefly_is_not_taken_for_the_filters_error() {
     assert!((value - 1.0).abs() < 0.05, "{value}");
 }
 
+/// A window in which no path has found light has no noise of its own, and must not be believed to be black.
+#[test]
+fn where_light_is_rare_hardly_any_hole_is_left() {
+    for halves in [true, false] {
+        // One half of a pixel in 50 finds it, 50 times as bright: 81 of 100 windows of nine pixels have seen none.
+        let found = |pixel: usize, half: u64| if mix64((pixel as u64) << 8 | half) % 50 == 0 { 50.0 } else { 0.0 };
+        let mut frame = frame(0.0, halves, |_, _| 0.0);
+        for (i, pixel) in frame.rows.iter_mut().flatten().enumerate() {
+            let [a, b] = [found(i, 0), found(i, u64::from(halves))];
+            pixel.own = Vec3::splat(0.5 * (a + b));
+            pixel.own_noise = halves.then(|| Vec3::splat(0.5 * (a - b)));
+        }
+        let (values, _) = frame.blend(&Blend::default());
+        let dark = values.iter().filter(|value| value.x < 0.5).count();
+        assert!(100 * dark < values.len(), "{halves}: {dark} of {}", values.len());
+    }
+}
+
 #[test]
 fn the_doubt_is_the_variance_of_the_error() {
     // Over many pixels of one bias and noise: a product of two normal-like numbers and its sample variance. Relative errors
