@@ -216,6 +216,11 @@ impl FrameFilter {
         matches!(self.sharing, Sharing::Adaptive(..))
     }
 
+    /// Whether the frame may end anywhere, as nothing is to be added to it later: no block needs to be whole.
+    pub fn is_open(&self) -> bool {
+        matches!(self.blocks.filtering, Filtering::Adaptive(params, _) if params.growing)
+    }
+
     /// Adds the paths of a block, by tile.
     pub fn add(&mut self, block: &Range<u64>, records: &[Vec<PathRecord>]) {
         match &mut self.sharing {

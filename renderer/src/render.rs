@@ -424,16 +424,16 @@ pub fn trace(
     let mut frame = begun.unwrap_or_else(|| Accumulation::new(prepared.description.clone()));
     assert_eq!(frame.description.difference(&prepared.description), None, "another frame was begun");
     frame.description = prepared.description;
-    let over = || time_limit.is_some_and(|limit| start.elapsed() >= limit) || observer.stop_requested();
+    let clock = Clock { start, limit: time_limit, done: frame.samples.count() };
     let Prepared { world, mut statistics, ids, .. } = prepared;
     let ids = ids.as_ref();
     let last = match world.geometry.alpha_test(&world.textures) {
         None => {
-            trace_passes(&world, &Opaque(world.geometry.scene()), ids, &mut frame, &mut statistics, observer, &over)
+            trace_passes(&world, &Opaque(world.geometry.scene()), ids, &mut frame, &mut statistics, observer, &clock)
         }
         Some(alpha) => {
             let queries = AlphaTested { scene: world.geometry.scene(), alpha };
-            trace_passes(&world, &queries, ids, &mut frame, &mut statistics, observer, &over)
+            trace_passes(&world, &queries, ids, &mut frame, &mut statistics, observer, &clock)
         }
     };
     // The filter is largest at the end, and by then nobody needs the scene any more.
@@ -491,15 +491,16 @@ fn trace_passes<Q: Queries + Sync>(
     frame: &mut Accumulation,
     statistics: &mut Statistics,
     observer: &dyn Observer,
-    over: &dyn Fn() -> bool,
+    clock: &Clock,
 ) -> Option<Block> {
     let mut rest = frame.samples.missing(&frame.description.asked);
     let progress = Progress::new(&frame.film, &frame.description.asked, rest.start, observer);
     let passes = Passes { world, queries, sampler: Sampler::new(frame.description.seed), ids, progress };
+    let over = || clock.is_over() || observer.stop_requested();
     while !rest.is_empty() && (frame.samples.count() == 0 || !over()) {
         let pass = frame.pass(&rest);
         let last;
-        (rest.start, last) = passes.trace_pass(&pass, frame, statistics, observer);
+        (rest.start, last) = passes.trace_pass(&pass, frame, statistics, observer, clock);
         statistics.passes += 1;
         if let Some(records) = last {
             return Some((pass.start..rest.start, records));
@@ -523,27 +524,36 @@ struct Passes<'a, Q> {
 }
 
 impl<Q: Queries + Sync> Passes<'_, Q> {
-    /// Traces a pass, or as much of it as the observer wants; the first sample that was not traced, and the paths of the last
-    /// block of a filtered frame.
+    /// Traces a pass, or as much of it as the observer wants or there is time for; the first sample that was not traced, and
+    /// the paths of the last block of a filtered frame.
     fn trace_pass(
         &self,
         pass: &Range<u64>,
         frame: &mut Accumulation,
         statistics: &mut Statistics,
         observer: &dyn Observer,
+        clock: &Clock,
     ) -> (u64, Option<Vec<Vec<PathRecord>>>) {
         let mut records = frame.filter.as_mut().map(FrameFilter::room).unwrap_or_default();
+        let divisible = frame.filter.as_ref().is_none_or(FrameFilter::divisible);
+        let open = frame.filter.as_ref().is_none_or(FrameFilter::is_open);
         let mut next = pass.start;
         loop {
             let done = frame.samples.count();
-            let divisible = frame.filter.as_ref().is_none_or(FrameFilter::divisible);
-            let end = if divisible { first_look(&(next..pass.end), done, observer.next_look()) } else { pass.end };
+            let look = if divisible { first_look(&(next..pass.end), done, observer.next_look()) } else { pass.end };
+            let end = if open { look.min(next.saturating_add(clock.affords(done))) } else { look };
             let counters = self.add(&(next..end), frame, &mut records);
             frame.counters += counters;
             frame.samples.insert(next..end).expect("passes do not overlap");
             next = end;
             if next == pass.end {
                 break;
+            }
+            if next < look {
+                if clock.is_over() {
+                    break;
+                }
+                continue;
             }
             frame.develop_with(&(pass.start..next), &records);
             if observer.look(&frame.film, frame.samples.count()) {
@@ -598,6 +608,29 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
         let mut sum = Counters::default();
         counters.into_iter().for_each(|counters| sum += counters);
         (sum, keepers)
+    }
+}
+
+/// The time that rendering may take.
+struct Clock {
+    start: Instant,
+    limit: Option<Duration>,
+    /// Samples per pixel that there were at the start.
+    done: u64,
+}
+
+impl Clock {
+    fn is_over(&self) -> bool {
+        self.limit.is_some_and(|limit| self.start.elapsed() >= limit)
+    }
+
+    /// How many more samples per pixel there will be time for, now that there are `samples`; at least one.
+    fn affords(&self, samples: u64) -> u64 {
+        let Some(limit) = self.limit else { return u64::MAX };
+        let taken = self.start.elapsed();
+        let per_sample = taken.as_secs_f64() / samples.saturating_sub(self.done) as f64;
+        // With none to go by that is infinite, and what it affords is one.
+        ((limit.saturating_sub(taken).as_secs_f64() / per_sample) as u64).max(1)
     }
 }
 

@@ -6,9 +6,10 @@
 //! heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
 //! has wrong. But where light is rare a few pixels may all have missed it, and seem to be without noise: the variance counts
 //! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it all,
-//! spread over all nine; where there is none at all, as a ninth of what it counts as there, from window to window; and
-//! [`SCATTER`] of the scatter between pixels is added to it. (From window to window in all cases it would be too much: in
-//! veach-mis, whose dark plates lie beside noisy ones, the gain at one sample fell by two thirds.)
+//! spread over all nine; as [`MISSED`] of it where the pixels are darker than the filter says, for then what they miss may
+//! be the very light that it has from those around them; where there is none at all, as a ninth of what it counts as there,
+//! from window to window; and [`SCATTER`] of the scatter between pixels is added to it. (From window to window in all cases
+//! it would be too much: in veach-mis, whose dark plates lie beside noisy ones, the gain at one sample fell by two thirds.)
 //!
 //! Windows are nested, each thrice the side of the next. From the widest to the narrowest, a window's mean e and standard
 //! error s are weighed by [`most_probable`] against what is believed of the window around it, or the lower confidence bound
@@ -160,6 +161,8 @@ struct Evidence {
     doubt: f32,
     /// Squared error of the unfiltered value.
     noise: f32,
+    /// Luminance of the unfiltered value above that of the filtered one.
+    excess: f32,
     /// Pixels.
     count: f32,
 }
@@ -173,6 +176,7 @@ impl Add for Evidence {
             square: self.square + other.square,
             doubt: self.doubt + other.doubt,
             noise: self.noise + other.noise,
+            excess: self.excess + other.excess,
             count: self.count + other.count,
         }
     }
@@ -199,7 +203,14 @@ impl Difference {
         };
         let (variance, both) = (half.length_squared(), mean.dot(half));
         let error = mean.length_squared() - variance;
-        Evidence { error, square: error * error, doubt: 4.0 * both * both, noise: pixels * variance, count: 1.0 }
+        Evidence {
+            error,
+            square: error * error,
+            doubt: 4.0 * both * both,
+            noise: pixels * variance,
+            excess: luminance(mean),
+            count: 1.0,
+        }
     }
 }
 
@@ -216,6 +227,11 @@ struct Variance {
 /// pixel of nine that is wrong, at three standard errors, is certain only with less than an eighth.
 const SCATTER: f64 = 0.1;
 
+/// How much of the noise of wider windows counts in those that are darker than the filter says. With a ninth, walls that are
+/// lit through glass had dark cracks where no path of a window had found the lamp, with a third traces of them; with all of it
+/// a filter that is ten times too bright would pass for that.
+const MISSED: f64 = 0.5;
+
 impl Evidence {
     /// Mean squared error of the filtered value, and the standard error of this mean where the pixels have these variances.
     fn error(&self, variance: &Variance) -> [f64; 2] {
@@ -227,11 +243,12 @@ impl Evidence {
 
     /// What variances count as, in view of the wider window and of what they count as there.
     fn variance(&self, wider: Option<(&Self, Variance)>) -> Variance {
+        let share = if self.excess < 0.0 { MISSED } else { 1.0 / 9.0 };
         let counts = |of: fn(&Self) -> f32, known: fn(&Variance) -> f64| {
             let seen = |window: &Self| f64::from(of(window) / window.count);
             match (seen(self), wider) {
                 (0.0, Some((_, wider))) => known(&wider) / 9.0,
-                (own, Some((wider, _))) => own.max(seen(wider) / 9.0),
+                (own, Some((wider, _))) => own.max(share * seen(wider)),
                 (own, None) => own,
             }
         };
