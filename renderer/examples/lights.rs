@@ -27,7 +27,7 @@ fn triangles(count: u32) -> Vec<Emitter> {
     let triangle = |i: u32| {
         let p = vector(i, 0);
         let shape = Triangle::new([p, p + size * vector(i, 3), p + size * vector(i, 6)], None, None, false)?;
-        Some(Emitter { shape: Shape::Triangle(shape), light: AreaLightId(0) })
+        Some(Emitter { face_area: shape.area(), shape: Shape::Triangle(shape), light: AreaLightId(0) })
     };
     (0..count).filter_map(triangle).collect()
 }

@@ -4,6 +4,7 @@
 use renderer::render::Job;
 use renderer::world::Techniques;
 use tests::render::{mean_and_error, own_scene, with_variance};
+use tests::small::SceneFile;
 
 /// As in the furnace test.
 const Z: f64 = 4.4;
@@ -26,5 +27,43 @@ fn irradiance_of_simple_lights_is_that_of_the_textbook() {
     for techniques in [Techniques::Both, Techniques::Lights, Techniques::Bsdfs] {
         check("analytic/sphere-light.pbrt", techniques, 0.1125);
         check("analytic/square-light.pbrt", techniques, 1.939_442_5);
+    }
+}
+
+/// Looks straight down at the origin, through a film so small that it is a point, with `depth` bounces at most.
+fn down(from: f32, depth: u32, world: &str) -> String {
+    format!(
+        "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 4\n\
+         PixelFilter \"box\"\n\
+         Integrator \"path\" \"integer maxdepth\" {depth}\n\
+         LookAt 0 0 {from}  0 0 0  0 1 0\n\
+         Camera \"orthographic\" \"float screenwindow\" [-0.001 0.001 -0.001 0.001]\n\
+         WorldBegin\n{world}"
+    )
+}
+
+fn small(scene: &SceneFile, spp: u64, techniques: Techniques) -> (f64, f64) {
+    let job = Job { scene: scene.path(), spp: Some(spp), techniques, ..Job::default() };
+    mean_and_error(&with_variance(&job).film)
+}
+
+/// Corners of a trapezoid of area 2.4 that the origin is in, in z = 0 and counter-clockwise from above.
+const TRAPEZOID: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    -1 -1 0\n1 -1 0\n0.2 1 0\n-0.2 1 0\n4 0 1 2 3\n";
+
+#[test]
+fn a_power_is_that_of_a_whole_face() {
+    // A face that emits 4π from one side has the radiance 4π/(πA). Flat quads are two triangles to the ray query alone.
+    for (shape, area) in [
+        ("\"disk\" \"float radius\" 1.1283791671", 4.0),
+        ("\"bilinearmesh\" \"point3 P\" [-1 -1 0 1 -1 0 -1 1 0 1 1 0]", 4.0),
+        ("\"plymesh\" \"string filename\" \"trapezoid.ply\"", 2.4),
+        ("\"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 0 1 0]", 2.0),
+    ] {
+        let world = format!("AreaLightSource \"diffuse\" \"float power\" 12.566370614\nShape {shape}\n");
+        let scene = SceneFile::new(&down(5.0, 0, &world)).with("trapezoid.ply", TRAPEZOID);
+        let (mean, _) = small(&scene, 1, Techniques::Both);
+        assert!((mean * area / 4.0 - 1.0).abs() < 1e-5, "{shape}: {mean} is not {}", 4.0 / area);
     }
 }

@@ -28,6 +28,8 @@ pub type Message = (Span, String);
 pub struct Emitter {
     /// The shape, in the world.
     pub shape: Shape,
+    /// Area (m²) of the face that it is, or is half of: a power is that of the whole face.
+    pub face_area: f32,
     /// Its emission.
     pub light: AreaLightId,
 }
@@ -208,16 +210,16 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
         let groups: Vec<Group> = area.iter().map(|light| self.group_of(&light.group)).collect();
         let mut degenerate = vec![0usize; area.len()];
         let mut choices = Vec::with_capacity(emitters.len());
-        for Emitter { shape, light } in emitters {
+        for Emitter { shape, face_area, light } in emitters {
             let Some(mut emission) = emissions[light.index()].clone() else { continue };
             let shape_area = f64::from(shape.area());
             let mean = emission.image.map_or(DVec3::ONE, |image| means[image as usize]);
             if let Some(power) = area[light.index()].power.filter(|&p| p > 0.0) {
-                // As in pbrt, the power is that of each shape, and so of each triangle of a mesh.
+                // As in pbrt, the power is that of each shape, and so of each face of a mesh.
                 let sides = if emission.two_sided { 2.0 } else { 1.0 };
                 let relative = luminance_f64(if emission.image.is_some() { mean } else { DVec3::ONE });
-                emission.radiance =
-                    scaled(emission.radiance, f64::from(power), sides * shape_area * std::f64::consts::PI * relative);
+                let per_level = sides * f64::from(face_area) * std::f64::consts::PI * relative;
+                emission.radiance = scaled(emission.radiance, f64::from(power), per_level);
             }
             let number = self.built.emitters.len() as u32;
             let radiance = (emission.radiance.as_dvec3() * mean).element_sum() / 3.0;

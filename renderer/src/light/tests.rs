@@ -55,7 +55,7 @@ fn build(lights: &[description::Light], area: &[AreaLight], emitters: Vec<Emitte
 }
 
 fn emitter(shape: Shape, light: u32) -> Emitter {
-    Emitter { shape, light: AreaLightId(light) }
+    Emitter { face_area: shape.area(), shape, light: AreaLightId(light) }
 }
 
 fn sphere(center: DVec3, radius: f32) -> Shape {

@@ -174,7 +174,10 @@ impl<'d> Assembly<'d> {
     ) -> Option<u32> {
         let first = self.emitters.len();
         match primitives {
-            Primitives::Triangles(mesh) => self.emit(light, triangles(mesh, flipped)),
+            Primitives::Triangles(mesh) => {
+                self.emit(light, triangles(mesh, flipped));
+                join_halves(self.emitters.get_mut(first + mesh.first_quad_half as usize..).unwrap_or_default());
+            }
             Primitives::Patches(mesh) => self.emit(light, patches(mesh, flipped)),
             Primitives::Quadric(shape) => self.emit(light, std::iter::once(Some((**shape).clone()))),
             Primitives::Curves(_) => return None,
@@ -187,7 +190,16 @@ impl<'d> Assembly<'d> {
     }
 
     fn emit(&mut self, light: AreaLightId, shapes: impl Iterator<Item = Option<Shape>>) {
-        self.emitters.extend(shapes.flatten().map(|shape| Emitter { shape, light }));
+        let emitter = |shape: Shape| Emitter { face_area: shape.area(), shape, light };
+        self.emitters.extend(shapes.flatten().map(emitter));
+    }
+}
+
+/// Tells the halves of quads how large their quads are.
+fn join_halves(halves: &mut [Emitter]) {
+    for quad in halves.chunks_exact_mut(2) {
+        let area = quad[0].face_area + quad[1].face_area;
+        quad.iter_mut().for_each(|half| half.face_area = area);
     }
 }
 
