@@ -67,3 +67,28 @@ fn a_power_is_that_of_a_whole_face() {
         assert!((mean * area / 4.0 - 1.0).abs() < 1e-5, "{shape}: {mean} is not {}", 4.0 / area);
     }
 }
+
+const MIX: &str = "MakeNamedMaterial \"nothing\" \"string type\" \"interface\"\n\
+    MakeNamedMaterial \"black\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
+    MakeNamedMaterial \"mix\" \"string type\" \"mix\" \"string materials\" [\"black\" \"nothing\"] \"float amount\" AMOUNT\n\
+    NamedMaterial \"mix\"\n";
+
+#[test]
+fn light_behind_a_mix_with_nothing_is_as_strong_as_the_mix_lets_it_through() {
+    // A disk of radius 1 and radiance 1 two above a white floor, which sends on sin² of half its angle: 1/5. Between
+    // them a disk of a mix that hides it from all shadow rays.
+    for (amount, techniques) in
+        [1.0, 0.25].into_iter().flat_map(|a| [Techniques::Both, Techniques::Lights, Techniques::Bsdfs].map(|t| (a, t)))
+    {
+        let world = format!(
+            "Material \"diffuse\" \"rgb reflectance\" [1 1 1]\nShape \"disk\" \"float radius\" 0.5\n\
+             AttributeBegin\nMaterial \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
+             AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\nTranslate 0 0 2\nReverseOrientation\n\
+             Shape \"disk\"\nAttributeEnd\n{}Translate 0 0 1\nShape \"disk\" \"float radius\" 10\n",
+            MIX.replace("AMOUNT", &amount.to_string())
+        );
+        let (mean, error) = small(&SceneFile::new(&down(0.5, 5, &world)), 1024, techniques);
+        println!("{amount} {techniques:?}: {mean:.5} ± {error:.5}");
+        assert!((mean - 0.2 * amount).abs() <= Z * error + 1e-5, "{mean} ± {error}");
+    }
+}

@@ -61,7 +61,7 @@ pub struct Path<'w, R> {
     sample: Sample,
     /// What the ray has met.
     hit: Option<Hit>,
-    /// Where that is; `None` also at an interface between media, which is nothing.
+    /// Where that is; `None` also where a material lets the ray pass: an interface that emits or is part of a mix.
     place: Option<Place<'w>>,
 }
 
@@ -110,7 +110,7 @@ impl<'w, R: Recorder> Path<'w, R> {
             return false;
         }
         let Some(mut shading) = world.shade(&surface, path.cone_radius) else {
-            path.ray = spawn_ray(surface.point, surface.ng, path.ray.direction);
+            path.pass(&surface);
             return true;
         };
         if world.integrator.regularize && path.roughened {
@@ -161,7 +161,8 @@ struct Carried<R> {
     ray: Ray,
     /// Scattering events so far; interfaces do not count.
     bounce: u32,
-    /// The last scattering, `None` at the camera and after a delta lobe: no light sample could have gone this way.
+    /// The last scattering, `None` at the camera, after a delta lobe and behind an interface: no light sample could have
+    /// gone this way.
     last: Option<Scatter>,
     /// Product of η² over the refractions so far, undoing their scaling of radiance.
     eta_scale: f32,
@@ -222,6 +223,14 @@ impl<R: Recorder> Carried<R> {
         let last = self.last;
         direct::escaped(world, self.ray.direction, last.as_ref())
             .for_each(|(radiance, group)| self.meets(radiance, group));
+    }
+
+    /// The ray goes on through a surface as if that were not there. To a shadow ray it is: no light sample could have seen
+    /// what follows.
+    #[inline]
+    fn pass(&mut self, surface: &SurfaceInteraction<'_>) {
+        self.ray = spawn_ray(surface.point, surface.ng, self.ray.direction);
+        self.last = None;
     }
 
     /// The path is at a surface that scatters.
