@@ -1,6 +1,7 @@
 //! Scenes whose one value is known in closed form: the derivation is in each scene's file.
 #![allow(clippy::print_stdout, reason = "tests print the figures that they judge")]
 
+use renderer::film::{Aov, AovSet};
 use renderer::render::Job;
 use renderer::world::Techniques;
 use tests::render::{mean_and_error, own_scene, with_variance};
@@ -68,27 +69,52 @@ fn a_power_is_that_of_a_whole_face() {
     }
 }
 
-const MIX: &str = "MakeNamedMaterial \"nothing\" \"string type\" \"interface\"\n\
-    MakeNamedMaterial \"black\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
-    MakeNamedMaterial \"mix\" \"string type\" \"mix\" \"string materials\" [\"black\" \"nothing\"] \"float amount\" AMOUNT\n\
-    NamedMaterial \"mix\"\n";
+/// A white floor, a disk of radiance 1 and radius 1 two above it, and between them one of a mix through which one gets in
+/// `amount` of all cases, as if nothing were there. It is larger than all: no shadow ray gets past.
+fn veiled(amount: f64) -> String {
+    format!(
+        "Material \"diffuse\" \"rgb reflectance\" [1 1 1]\nShape \"disk\" \"float radius\" 0.5\n\
+         AttributeBegin\nMaterial \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
+         AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\nTranslate 0 0 2\nReverseOrientation\n\
+         Shape \"disk\"\nAttributeEnd\n\
+         MakeNamedMaterial \"nothing\" \"string type\" \"interface\"\n\
+         MakeNamedMaterial \"black\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
+         MakeNamedMaterial \"mix\" \"string type\" \"mix\" \"string materials\" [\"black\" \"nothing\"]\n\
+         \"float amount\" {amount}\n\
+         NamedMaterial \"mix\"\nTranslate 0 0 1\nShape \"disk\" \"float radius\" 10\n"
+    )
+}
 
 #[test]
 fn light_behind_a_mix_with_nothing_is_as_strong_as_the_mix_lets_it_through() {
-    // A disk of radius 1 and radiance 1 two above a white floor, which sends on sin² of half its angle: 1/5. Between
-    // them a disk of a mix that hides it from all shadow rays.
+    // The floor sends on sin² of half the angle of the light's disk: 1/5.
     for (amount, techniques) in
         [1.0, 0.25].into_iter().flat_map(|a| [Techniques::Both, Techniques::Lights, Techniques::Bsdfs].map(|t| (a, t)))
     {
-        let world = format!(
-            "Material \"diffuse\" \"rgb reflectance\" [1 1 1]\nShape \"disk\" \"float radius\" 0.5\n\
-             AttributeBegin\nMaterial \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
-             AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\nTranslate 0 0 2\nReverseOrientation\n\
-             Shape \"disk\"\nAttributeEnd\n{}Translate 0 0 1\nShape \"disk\" \"float radius\" 10\n",
-            MIX.replace("AMOUNT", &amount.to_string())
-        );
-        let (mean, error) = small(&SceneFile::new(&down(0.5, 5, &world)), 1024, techniques);
+        let (mean, error) = small(&SceneFile::new(&down(0.5, 5, &veiled(amount))), 1024, techniques);
         println!("{amount} {techniques:?}: {mean:.5} ± {error:.5}");
         assert!((mean - 0.2 * amount).abs() <= Z * error + 1e-5, "{mean} ± {error}");
+    }
+}
+
+#[test]
+fn a_path_without_bounces_sees_through_nothing_and_what_it_has_met() {
+    // From above the light, which is seen through the mix from half way.
+    let up = down(0.5, 0, &veiled(1.0)).replace("0 0 0.5  0 0 0", "0 0 0.5  0 0 2");
+    let (mean, _) = small(&SceneFile::new(&up), 1, Techniques::Both);
+    assert_eq!(mean, 1.0, "a light behind an interface");
+    let aovs = [Aov::GeometricNormal, Aov::Depth, Aov::Albedo, Aov::DenoiseAlbedo];
+    for depth in [0, 5] {
+        for (text, depth_seen, n) in [(up.clone(), 1.5, -1.0), (down(0.5, 0, &veiled(1.0)), 0.5, 1.0)] {
+            let text = text.replace("\"integer maxdepth\" 0", &format!("\"integer maxdepth\" {depth}"));
+            let job = Job { aovs: AovSet::from_iter(aovs), spp: Some(1), ..Job::default() };
+            let image = SceneFile::new(&text).render(job).film.image();
+            let at = |name: &str| image.values[image.channels.iter().position(|c| c.name == name).unwrap()];
+            assert_eq!(at("A"), 1.0, "coverage with {depth} bounces");
+            assert!((at("depth.Z") - depth_seen).abs() < 1e-6, "{} with {depth} bounces", at("depth.Z"));
+            assert_eq!(at("Ng.Z"), n);
+            let albedo = if n > 0.0 { 1.0 } else { 0.0 };
+            assert_eq!((at("albedo.R"), at("denoise.albedo.R")), (albedo, albedo), "{depth} bounces");
+        }
     }
 }

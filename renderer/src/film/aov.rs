@@ -18,7 +18,7 @@ pub enum Aov {
     GeometricNormal,
     /// `P.{X,Y,Z}`: position of the first hit, world space.
     Position,
-    /// `depth.Z`: distance of the first hit from the camera ray's origin.
+    /// `depth.Z`: distance of the first hit from the camera ray's origin, through interfaces.
     Depth,
     /// `variance.{R,G,B}`: variance of one sample.
     Variance,

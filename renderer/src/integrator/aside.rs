@@ -113,7 +113,7 @@ impl<'w> Aside<'w> {
 }
 
 impl Recorder for Aside<'_> {
-    fn arrive(&mut self, vertex: &Vertex<'_>, _: f32) {
+    fn see(&mut self, vertex: &Vertex<'_>) {
         if self.bounces == 0 {
             self.seen = self.ids.map(|ids| ids.of(vertex.surface));
         }
@@ -123,6 +123,8 @@ impl Recorder for Aside<'_> {
             self.feature = Some(Feature { albedo, ns: vertex.shading.frame.n * (side * self.worth) });
         }
     }
+
+    fn arrive(&mut self, _: &Vertex<'_>, _: f32) {}
 
     fn receive(&mut self, _: &Vertex<'_>, light: &DirectLight) {
         self.add(self.beta * (light.f * light.incident), light.group, self.bounces + 1);

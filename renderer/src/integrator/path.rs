@@ -94,7 +94,7 @@ impl<'w, R: Recorder> Path<'w, R> {
         (Sample { radiance: self.carried.radiance, ..self.sample }, self.carried.recorder)
     }
 
-    /// The light that the ray has run into, and what is there. Whether the path scatters there or goes on as it is.
+    /// The light that the ray has run into, and what is there. Whether the path may scatter there or goes on as it is.
     fn meet(&mut self, world: &'w World, first_hit: bool) -> bool {
         let path = &mut self.carried;
         self.place = None;
@@ -106,9 +106,6 @@ impl<'w, R: Recorder> Path<'w, R> {
         path.advance(surface.t);
         let emitted = direct::emitted(world, &surface, path.last.as_ref());
         emitted.into_iter().for_each(|(radiance, group)| path.meets(radiance, group));
-        if path.bounce == world.integrator.max_depth {
-            return false;
-        }
         let Some(mut shading) = world.shade(&surface, path.cone_radius) else {
             path.pass(&surface);
             return true;
@@ -117,12 +114,16 @@ impl<'w, R: Recorder> Path<'w, R> {
             shading.bsdf = shading.bsdf.regularized();
         }
         let (wo, numbers) = (shading.frame.to_local(surface.wo), self.numbers.vertex(path.bounce));
-        let place = self.place.insert(Place { surface, shading, wo, numbers, light: None });
+        let vertex = self.place.insert(Place { surface, shading, wo, numbers, light: None }).vertex();
         if path.bounce == 0 {
             self.sample.alpha = 1.0;
-            self.sample.first = if first_hit { place.vertex().first_hit(world) } else { FirstHit::default() };
+            self.sample.first = if first_hit { vertex.first_hit(world, path.length) } else { FirstHit::default() };
         }
-        path.arrive(&place.vertex());
+        path.recorder.see(&vertex);
+        if path.bounce == world.integrator.max_depth {
+            return false;
+        }
+        path.arrive(&vertex);
         true
     }
 
@@ -161,6 +162,8 @@ struct Carried<R> {
     ray: Ray,
     /// Scattering events so far; interfaces do not count.
     bounce: u32,
+    /// Length of the path so far.
+    length: f32,
     /// The last scattering, `None` at the camera, after a delta lobe and behind an interface: no light sample could have
     /// gone this way.
     last: Option<Scatter>,
@@ -192,6 +195,7 @@ impl<R: Recorder> Carried<R> {
             beta: Rgb::ONE,
             ray: camera.ray,
             bounce: 0,
+            length: 0.0,
             last: None,
             eta_scale: 1.0,
             roughened: false,
@@ -206,6 +210,7 @@ impl<R: Recorder> Carried<R> {
     /// The ray has met a surface at `distance`.
     #[inline]
     fn advance(&mut self, distance: f32) {
+        self.length += distance;
         self.cone_radius += self.cone_spread * distance;
         self.reach += self.pixel_spread * distance;
     }
@@ -225,7 +230,7 @@ impl<R: Recorder> Carried<R> {
             .for_each(|(radiance, group)| self.meets(radiance, group));
     }
 
-    /// The ray goes on through a surface as if that were not there. To a shadow ray it is: no light sample could have seen
+    /// The ray goes on through a surface as if it were not there. To shadow rays it is there: no light sample could have seen
     /// what follows.
     #[inline]
     fn pass(&mut self, surface: &SurfaceInteraction<'_>) {
@@ -283,14 +288,14 @@ fn unit(v: Vec3) -> Vec3 {
 }
 
 impl Vertex<'_> {
-    /// What auxiliary outputs show of the vertex.
-    fn first_hit(&self, world: &World) -> FirstHit {
+    /// What auxiliary outputs show of the vertex, to which the path has the length `depth`.
+    fn first_hit(&self, world: &World, depth: f32) -> FirstHit {
         FirstHit {
             albedo: self.shading.bsdf.albedo(self.wo),
             ns: self.shading.frame.n,
             ng: self.surface.ng,
             p: world.origin + self.surface.point.p.as_dvec3(),
-            depth: self.surface.t,
+            depth,
         }
     }
 }

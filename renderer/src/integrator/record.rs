@@ -9,7 +9,7 @@ use crate::math::Rgb;
 pub struct Sample {
     /// Radiance along the camera ray.
     pub radiance: Rgb,
-    /// 1 where the camera ray met a surface, 0 where it escaped.
+    /// 1 where the camera ray met a surface that scatters, 0 where it escaped.
     pub alpha: f32,
     /// The first hit; left at its default where none is asked for.
     pub first: FirstHit,
@@ -26,7 +26,7 @@ pub struct FirstHit {
     pub ng: Vec3,
     /// Position, in the coordinates of the scene's files.
     pub p: DVec3,
-    /// Distance along the camera ray.
+    /// Distance along the camera ray, through interfaces.
     pub depth: f32,
 }
 

@@ -10,7 +10,9 @@ use crate::math::Rgb;
 
 /// Is told of everything that happens to a path, in order.
 pub trait Recorder {
-    /// The path is at a surface that scatters. `footprint`: side of the square that a pixel covers there, world units, if
+    /// The path has met a surface that scatters, even if it is at its last vertex.
+    fn see(&mut self, _: &Vertex<'_>) {}
+    /// It will scatter there. `footprint`: side of the square that a pixel covers there, world units, if
     /// the surfaces so far are taken for flat mirrors.
     fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32);
     /// A light sample brings light to the vertex.
@@ -42,6 +44,11 @@ impl Recorder for Unrecorded {
 
 /// Two that are told the same.
 impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+    #[inline]
+    fn see(&mut self, vertex: &Vertex<'_>) {
+        self.0.see(vertex);
+        self.1.see(vertex);
+    }
     #[inline]
     fn arrive(&mut self, vertex: &Vertex<'_>, footprint: f32) {
         self.0.arrive(vertex, footprint);
