@@ -12,6 +12,7 @@ use renderer::sampling::{Dimension, Sampler};
 use renderer::scene::Span;
 use renderer::scene::description::{AreaLight, AreaLightId, Light, LightKind};
 use renderer::shape::{Shape, Triangle};
+use renderer::texture::Textures;
 
 /// Uniform numbers that the branch predictor does not learn.
 fn number(i: u32, k: u32) -> f32 {
@@ -27,7 +28,7 @@ fn triangles(count: u32) -> Vec<Emitter> {
     let triangle = |i: u32| {
         let p = vector(i, 0);
         let shape = Triangle::new([p, p + size * vector(i, 3), p + size * vector(i, 6)], None, None, false)?;
-        Some(Emitter { face_area: shape.area(), shape: Shape::Triangle(shape), light: AreaLightId(0) })
+        Some(Emitter { face_area: shape.area(), shape: Shape::Triangle(shape), alpha: None, light: AreaLightId(0) })
     };
     (0..count).filter_map(triangle).collect()
 }
@@ -76,6 +77,7 @@ fn main() {
         .collect();
     for (name, lights, emitters) in scenes {
         let count = emitters.len();
+        let textures = Textures::default();
         let start = Instant::now();
         let (lights, _) = match Lights::build(&lights, &area, emitters, (Vec3::NEG_ONE, Vec3::ONE)) {
             Ok(built) => built,
@@ -84,7 +86,7 @@ fn main() {
         let build = start.elapsed();
         let sample = nanoseconds(|i| {
             let (from, u, v, _) = &inputs[i];
-            black_box(lights.sample(from, *u, *v));
+            black_box(lights.sample(&textures, from, *u, *v));
         });
         let density = nanoseconds(|i| {
             let (from, .., p) = &inputs[i];

@@ -49,7 +49,8 @@ fn small(scene: &SceneFile, spp: u64, techniques: Techniques) -> (f64, f64) {
 }
 
 /// Corners of a trapezoid of area 2.4 that the origin is in, in z = 0 and counter-clockwise from above.
-const TRAPEZOID: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+const TRAPEZOID: &[u8] =
+    b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
     element face 1\nproperty list uchar int vertex_indices\nend_header\n\
     -1 -1 0\n1 -1 0\n0.2 1 0\n-0.2 1 0\n4 0 1 2 3\n";
 
@@ -115,6 +116,43 @@ fn a_path_without_bounces_sees_through_nothing_and_what_it_has_met() {
             assert_eq!(at("Ng.Z"), n);
             let albedo = if n > 0.0 { 1.0 } else { 0.0 };
             assert_eq!((at("albedo.R"), at("denoise.albedo.R")), (albedo, albedo), "{depth} bounces");
+        }
+    }
+}
+
+#[test]
+fn emitters_with_holes_light_by_what_is_left_of_them() {
+    // Of a disk's light half is left. A ray that passes the front of a sphere may still meet its back, which two-sided
+    // ones and those turned inside out show: a half, and half of a half.
+    let disk = |alpha: &str| format!("ReverseOrientation\nShape \"disk\" {alpha}\n");
+    let sphere = |alpha: &str| format!("Shape \"sphere\" {alpha}\n");
+    let checks = "\"texture alpha\" \"checks\"";
+    let half = "\"float alpha\" 0.5";
+    let cases = [
+        (disk(""), "false", 0.5),
+        (disk(half), "false", 0.25),
+        (disk(checks), "false", 0.25),
+        (sphere(""), "false", 0.25),
+        (sphere(half), "false", 0.125),
+        (sphere(half), "true", 0.1875),
+        (format!("ReverseOrientation\n{}", sphere(half)), "false", 0.0625),
+    ];
+    for (shape, two_sided, expected) in cases {
+        // The disk is one above the floor, the sphere's centre two.
+        let height = if shape.contains("disk") { 1 } else { 2 };
+        let world = format!(
+            "Texture \"checks\" \"float\" \"checkerboard\" \"float uscale\" 64 \"float vscale\" 64\n\
+             Material \"diffuse\" \"rgb reflectance\" [1 1 1]\nShape \"disk\" \"float radius\" 0.5\n\
+             Material \"diffuse\" \"rgb reflectance\" [0 0 0]\n\
+             AreaLightSource \"diffuse\" \"rgb L\" [1 1 1] \"bool twosided\" {two_sided}\n\
+             Translate 0 0 {height}\n{shape}"
+        );
+        let scene = SceneFile::new(&down(0.5, 1, &world));
+        for techniques in [Techniques::Both, Techniques::Lights, Techniques::Bsdfs] {
+            let (mean, error) = small(&scene, 4096, techniques);
+            println!("{shape}{two_sided} {techniques:?}: {mean:.5} ± {error:.5}, expected {expected}");
+            // Of the checks' borders, 64 across, a thousandth may be on one side more than on the other.
+            assert!((mean - expected).abs() <= Z * error + 2e-3 * expected, "{shape} {techniques:?}: {mean} ± {error}");
         }
     }
 }

@@ -198,14 +198,7 @@ impl<'s> Loading<'s> {
                 }
                 return None;
             }
-            alpha => {
-                if emits {
-                    let text = "light samples of this emitting shape do not see its alpha: \
-                                it lights the scene as if it had no holes";
-                    messages.warn(shape.span, text);
-                }
-                Some(alpha)
-            }
+            alpha => Some(alpha),
         };
         // Between media that are not rendered, an interface is nothing.
         let interface = matches!(scene.materials[shape.material.index()].kind, MaterialKind::Interface);

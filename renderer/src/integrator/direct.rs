@@ -84,7 +84,7 @@ pub struct DirectLight {
 /// `wo`.
 pub fn sample(world: &World, vertex: &Vertex<'_>, numbers: &VertexNumbers) -> Option<(DirectLight, Ray)> {
     let (u_select, u) = (numbers.d1(Use::LightSelect), numbers.d2(Use::Light));
-    let light = world.lights.sample(&vertex.receiver(), u_select, u)?;
+    let light = world.lights.sample(&world.textures, &vertex.receiver(), u_select, u)?;
     let wi = vertex.shading.frame.to_local(light.wi);
     let (f, bsdf_pdf) = vertex.shading.bsdf.eval_pdf(vertex.wo, wi);
     if f == Rgb::ZERO {

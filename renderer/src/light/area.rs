@@ -7,7 +7,9 @@ use glam::{Vec2, Vec3};
 use super::Group;
 use super::image::LightImage;
 use crate::math::Rgb;
-use crate::shape::Shape;
+use crate::scene::description::Value;
+use crate::shape::{Shape, ShapeSample};
+use crate::texture::{TexturePoint, Textures};
 
 /// A shape that emits.
 #[derive(Clone, Debug)]
@@ -16,6 +18,8 @@ pub struct AreaEmitter {
     pub shape: Shape,
     /// Its emission.
     pub emission: Emission,
+    /// Probability of a point being there, `None`: 1. What light samples find is that much darker in the mean.
+    pub alpha: Option<Value<f32>>,
     /// Its group.
     pub group: Group,
 }
@@ -29,6 +33,17 @@ pub struct Emission {
     pub image: Option<u32>,
     /// Emits also on the side that the normal points away from.
     pub two_sided: bool,
+}
+
+impl AreaEmitter {
+    /// Radiance that a sampled point sends along `wo` in the mean over whether it is there.
+    #[inline]
+    pub fn sampled(&self, images: &[Arc<LightImage>], textures: &Textures, at: &ShapeSample, wo: Vec3) -> Rgb {
+        let radiance = self.emission.radiance(images, at.uv, at.n, wo);
+        let Some(alpha) = &self.alpha else { return radiance };
+        let at = TexturePoint { p: at.point.p, n: at.n, uv: at.uv, ..TexturePoint::default() };
+        radiance * textures.float(alpha, &at).clamp(0.0, 1.0)
+    }
 }
 
 impl Emission {

@@ -15,7 +15,7 @@ use super::tree::{LightTree, build::Candidate};
 use super::{Group, Lights, NO_GROUP};
 use crate::math::{Rgb, luminance};
 use crate::scene::Span;
-use crate::scene::description::{self, AreaLightId};
+use crate::scene::description::{self, AreaLightId, Value};
 use crate::shape::Shape;
 use crate::texture::RgbImage;
 use crate::texture::image::{Channels, load_texels};
@@ -30,6 +30,8 @@ pub struct Emitter {
     pub shape: Shape,
     /// Area (m²) of the face that it is, or is half of: a power is that of the whole face.
     pub face_area: f32,
+    /// Probability of a point being there; `None`: 1.
+    pub alpha: Option<Value<f32>>,
     /// Its emission.
     pub light: AreaLightId,
 }
@@ -210,7 +212,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
         let groups: Vec<Group> = area.iter().map(|light| self.group_of(&light.group)).collect();
         let mut degenerate = vec![0usize; area.len()];
         let mut choices = Vec::with_capacity(emitters.len());
-        for Emitter { shape, face_area, light } in emitters {
+        for Emitter { shape, face_area, alpha, light } in emitters {
             let Some(mut emission) = emissions[light.index()].clone() else { continue };
             let shape_area = f64::from(shape.area());
             let mean = emission.image.map_or(DVec3::ONE, |image| means[image as usize]);
@@ -229,7 +231,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
                 degenerate[light.index()] += 1;
             }
             let group = groups[light.index()];
-            self.built.emitters.push(AreaEmitter { shape, emission, group });
+            self.built.emitters.push(AreaEmitter { shape, emission, alpha, group });
         }
         for (light, &count) in area.iter().zip(&degenerate) {
             if count > 0 {

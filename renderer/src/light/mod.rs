@@ -31,6 +31,7 @@ pub use compile::{Emitter, Message};
 pub use mis::power_heuristic;
 
 use crate::math::{PointWithError, Rgb};
+use crate::texture::Textures;
 use area::AreaEmitter;
 use image::LightImage;
 use infinite::Infinite;
@@ -179,9 +180,9 @@ impl Lights {
     /// Light for a receiver from one light, chosen by `u_select` and sampled by `u`, all uniform in [0, 1).
     ///
     /// The mean of radiance·f/pdf is the integral of incident radiance times f over solid angle, without regard to what is
-    /// in between. `None`: a sample of value 0.
+    /// in between. `None`: a sample of value 0. `textures`: those of the emitters' alpha.
     #[inline]
-    pub fn sample(&self, from: &Receiver, u_select: f32, u: Vec2) -> Option<LightSample> {
+    pub fn sample(&self, textures: &Textures, from: &Receiver, u_select: f32, u: Vec2) -> Option<LightSample> {
         let choice = u_select / self.infinite_pmf;
         if self.sampled_infinite > 0 && (choice as usize) < self.sampled_infinite {
             return self.sample_infinite(choice as usize, from, u);
@@ -191,7 +192,7 @@ impl Lights {
         let (light, pmf) = self.tree.choose(from, rest)?;
         let pmf = pmf * self.bounded_pmf();
         match self.emitters.get(light as usize) {
-            Some(emitter) => self.sample_emitter(emitter, pmf, from, u),
+            Some(emitter) => self.sample_emitter(emitter, textures, pmf, from, u),
             None => sample_point(&self.points[light as usize - self.emitters.len()], pmf, from),
         }
     }
@@ -212,10 +213,17 @@ impl Lights {
     }
 
     #[inline]
-    fn sample_emitter(&self, emitter: &AreaEmitter, pmf: f32, from: &Receiver, u: Vec2) -> Option<LightSample> {
+    fn sample_emitter(
+        &self,
+        emitter: &AreaEmitter,
+        textures: &Textures,
+        pmf: f32,
+        from: &Receiver,
+        u: Vec2,
+    ) -> Option<LightSample> {
         let sample = emitter.shape.sample(from.p, u)?;
         let wi = (sample.point.p - from.p).try_normalize()?;
-        let radiance = emitter.emission.radiance(&self.images, sample.uv, sample.n, -wi);
+        let radiance = emitter.sampled(&self.images, textures, &sample, -wi);
         let pdf = sample.pdf * pmf;
         let target = Target::Surface { point: sample.point, n: sample.n };
         usable(radiance, pdf).then_some(LightSample { radiance, wi, pdf, delta: false, target, group: emitter.group })

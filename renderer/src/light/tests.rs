@@ -55,7 +55,7 @@ fn build(lights: &[description::Light], area: &[AreaLight], emitters: Vec<Emitte
 }
 
 fn emitter(shape: Shape, light: u32) -> Emitter {
-    Emitter { face_area: shape.area(), shape, light: AreaLightId(light) }
+    Emitter { face_area: shape.area(), shape, alpha: None, light: AreaLightId(light) }
 }
 
 fn sphere(center: DVec3, radius: f32) -> Shape {
@@ -92,7 +92,7 @@ fn sampled_irradiance(lights: &Lights, from: &Receiver, samples: u32) -> Mean {
     let mut random = Random::new(21);
     let mut mean = Mean::default();
     for _ in 0..samples {
-        let sample = lights.sample(from, random.unit(), random.square());
+        let sample = lights.sample(&Textures::default(), from, random.unit(), random.square());
         mean.add(
             sample.map_or(DVec3::ZERO, |s| {
                 s.radiance.as_dvec3() * f64::from(s.wi.dot(from.n).max(0.0)) / f64::from(s.pdf)
@@ -130,7 +130,7 @@ fn a_panel_gives_the_irradiance_of_lamberts_formula() {
     }
     // Behind it.
     let above = Receiver { p: Vec3::Z * 3.0, n: -Vec3::Z };
-    assert!(lights.sample(&above, 0.3, Vec2::splat(0.4)).is_none());
+    assert!(lights.sample(&Textures::default(), &above, 0.3, Vec2::splat(0.4)).is_none());
     assert_eq!(lights.emitter_pdf(0, &above, Vec3::new(-0.5, 0.5, 2.0), -Vec3::Z), 0.0);
 }
 
@@ -228,7 +228,7 @@ fn the_density_is_that_of_samples() {
         let mut observed = vec![0.0; BINS * BINS];
         let mut none = 0;
         for _ in 0..SAMPLES {
-            let Some(sample) = lights.sample(&from, random.unit(), random.square()) else {
+            let Some(sample) = lights.sample(&Textures::default(), &from, random.unit(), random.square()) else {
                 none += 1;
                 continue;
             };
@@ -252,7 +252,7 @@ fn a_sample_has_the_density_that_a_hit_is_weighted_with() {
     for i in 0..20_000 {
         let n = if i % 3 == 0 { Vec3::ZERO } else { random.direction() };
         let from = Receiver { p: random.cube() * 1.4, n };
-        let Some(sample) = lights.sample(&from, random.unit(), random.square()) else { continue };
+        let Some(sample) = lights.sample(&Textures::default(), &from, random.unit(), random.square()) else { continue };
         match sample.target {
             Target::Surface { point, n } => {
                 surfaces += 1;
@@ -294,7 +294,7 @@ fn light_and_bsdf_samples_weighted_together_are_complete() {
         let mut mean = Mean::default();
         for _ in 0..100_000 {
             let mut value = DVec3::ZERO;
-            if let Some(s) = lights.sample(&from, random.unit(), random.square()) {
+            if let Some(s) = lights.sample(&Textures::default(), &from, random.unit(), random.square()) {
                 let cos = s.wi.dot(n).max(0.0);
                 let weight = power_heuristic(s.pdf, warp::cosine_hemisphere_pdf(cos));
                 value += s.radiance.as_dvec3() * f64::from(cos * weight / s.pdf);
@@ -388,7 +388,7 @@ fn environments_have_the_illuminance_asked_for() {
     sampled_irradiance(&lights, &up, 1000).assert_is(DVec3::splat(5.0), "uniform");
     let kind = LightKind::Distant { radiance: Rgb::ONE, from: Vec3::Z * 3.0, to: Vec3::ZERO, illuminance: Some(5.0) };
     let lights = build(&[light(kind)], &[], vec![]);
-    let sample = lights.sample(&up, 0.7, Vec2::ZERO).unwrap();
+    let sample = lights.sample(&Textures::default(), &up, 0.7, Vec2::ZERO).unwrap();
     assert_eq!((sample.radiance, sample.wi, sample.pdf, sample.delta), (Rgb::splat(5.0), Vec3::Z, 1.0, true));
 }
 
@@ -411,14 +411,14 @@ fn lights_turn_with_their_transform() {
     // Several, so that the tree must find them by their cones.
     let lights = build(&vec![spot; 12], &[], vec![]);
     let lit = Receiver { p: Vec3::new(5.0, 2.5, 3.2), n: Vec3::ZERO };
-    let sample = lights.sample(&lit, 0.4, Vec2::ZERO).unwrap();
+    let sample = lights.sample(&Textures::default(), &lit, 0.4, Vec2::ZERO).unwrap();
     assert!((sample.radiance.x * 16.29 - 1.0).abs() < 1e-3 && sample.target == Target::Point(Vec3::new(1.0, 2.0, 3.0)));
     for p in [Vec3::new(-3.0, 2.0, 3.0), Vec3::new(1.0, 2.0, 7.0), Vec3::new(1.0, 2.0, 3.0)] {
-        assert!(lights.sample(&Receiver { p, n: Vec3::ZERO }, 0.4, Vec2::ZERO).is_none(), "{p}");
+        assert!(lights.sample(&Textures::default(), &Receiver { p, n: Vec3::ZERO }, 0.4, Vec2::ZERO).is_none(), "{p}");
     }
     let kind = LightKind::Distant { radiance: Rgb::ONE, from: Vec3::Z, to: Vec3::ZERO, illuminance: None };
     let sun = build(&[description::Light { world_from_light, ..light(kind) }], &[], vec![]);
-    assert!((sun.sample(&lit, 0.4, Vec2::ZERO).unwrap().wi - Vec3::X).length() < 1e-6);
+    assert!((sun.sample(&Textures::default(), &lit, 0.4, Vec2::ZERO).unwrap().wi - Vec3::X).length() < 1e-6);
 }
 
 #[test]
@@ -480,22 +480,26 @@ fn emitters_are_chosen_on_their_side_and_only_there() {
 fn hopeless_input_is_safe() {
     let nowhere = Receiver { p: Vec3::ONE, n: Vec3::Z };
     let empty = build(&[], &[], vec![]);
-    assert!(empty.is_empty() && empty.sample(&nowhere, 0.5, Vec2::ZERO).is_none());
+    assert!(empty.is_empty() && empty.sample(&Textures::default(), &nowhere, 0.5, Vec2::ZERO).is_none());
     assert_eq!(all(empty.escaped(Vec3::X, Some(&nowhere), 1.0)), Rgb::ZERO);
 
     // Lights that emit nothing are no lights.
     let dark = build(&[environment("black"), uniform(Rgb::ZERO), point(Vec3::ONE, Rgb::ZERO)], &[], vec![]);
-    assert!(dark.is_empty() && dark.sample(&nowhere, 0.5, Vec2::ZERO).is_none());
+    assert!(dark.is_empty() && dark.sample(&Textures::default(), &nowhere, 0.5, Vec2::ZERO).is_none());
     let black = build(&[], &[area_light(Rgb::ZERO)], panel(2.0, 1.0).map(|s| emitter(s, 0)).to_vec());
     assert!(black.is_empty());
     assert_eq!(black.emitter_pdf(1, &nowhere, Vec3::Z * 2.0, -Vec3::Z), 0.0);
 
     // At the place of a light.
     let lights = build(&[point(Vec3::ONE, Rgb::ONE), point(Vec3::ONE, Rgb::ONE)], &[], vec![]);
-    assert!(lights.sample(&nowhere, 0.5, Vec2::ZERO).is_none());
+    assert!(lights.sample(&Textures::default(), &nowhere, 0.5, Vec2::ZERO).is_none());
     // Radiance that f32 cannot hold.
     let bright = build(&[point(Vec3::ZERO, Rgb::splat(1e12))], &[], vec![]);
-    assert!(bright.sample(&Receiver { p: Vec3::splat(1e-15), n: Vec3::ZERO }, 0.5, Vec2::ZERO).is_none());
+    assert!(
+        bright
+            .sample(&Textures::default(), &Receiver { p: Vec3::splat(1e-15), n: Vec3::ZERO }, 0.5, Vec2::ZERO)
+            .is_none()
+    );
 }
 
 #[test]
@@ -506,7 +510,7 @@ fn bright_and_dim_lights_share_a_frame() {
     let mut random = Random::new(61);
     for _ in 0..10_000 {
         let from = Receiver { p: random.cube() * 2.0, n: random.direction() };
-        if let Some(sample) = lights.sample(&from, random.unit(), random.square()) {
+        if let Some(sample) = lights.sample(&Textures::default(), &from, random.unit(), random.square()) {
             assert!(sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance.is_finite());
         }
         let escaped = all(lights.escaped(random.direction(), Some(&from), random.unit() * 1e12));
@@ -567,7 +571,7 @@ fn the_result_does_not_depend_on_how_often_it_is_built() {
     for _ in 0..1000 {
         let from = Receiver { p: random.cube(), n: random.direction() };
         let (u, v) = (random.unit(), random.square());
-        assert_eq!(a.sample(&from, u, v), b.sample(&from, u, v));
+        assert_eq!(a.sample(&Textures::default(), &from, u, v), b.sample(&Textures::default(), &from, u, v));
     }
 }
 

@@ -94,6 +94,16 @@ macro_rules! each {
 }
 
 impl Shape {
+    /// The same shape with holes, through which parts of it are seen behind others: samples go to all of it.
+    #[must_use]
+    pub fn with_holes(self) -> Self {
+        match self {
+            Self::Sphere(sphere) => Self::Sphere(Box::new(sphere.with_holes())),
+            // Sampled all over as they are.
+            Self::Triangle(_) | Self::Patch(_) | Self::Disk(_) | Self::Cylinder(_) => self,
+        }
+    }
+
     /// Surface area, one side.
     pub fn area(&self) -> f32 {
         each!(self, shape => shape.area())

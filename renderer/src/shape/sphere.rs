@@ -22,6 +22,8 @@ pub struct Sphere {
     phi_max: f64,
     /// Nothing is cut away.
     whole: bool,
+    /// Its far side is seen through holes.
+    holed: bool,
 }
 
 impl Sphere {
@@ -45,7 +47,13 @@ impl Sphere {
         let whole = z_min == -radius && z_max == radius && phi_max == TAU;
         let theta = [z_min, z_max].map(|z| (z / radius).clamp(-1.0, 1.0).acos());
         let placement = Placement::new(world_from_shape, reverse_orientation)?;
-        (z_max > z_min).then_some(Self { placement, radius, z_min, z_max, theta, phi_max, whole })
+        (z_max > z_min).then_some(Self { placement, radius, z_min, z_max, theta, phi_max, whole, holed: false })
+    }
+
+    /// See [`super::Shape::with_holes`].
+    #[must_use]
+    pub fn with_holes(self) -> Self {
+        Self { holed: true, ..self }
     }
 
     /// Surface area.
@@ -107,8 +115,8 @@ impl Sphere {
     }
 
     /// See [`super::Shape::sample`]. A whole sphere is sampled by solid angle: from outside by the cone that it fills,
-    /// from inside by the whole sphere of directions. From the sphere itself it is sampled by area, as are an ellipsoid or a
-    /// part from anywhere.
+    /// from inside by the whole sphere of directions. From the sphere itself it is sampled by area, as are an ellipsoid, a
+    /// part and what has holes from anywhere.
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<ShapeSample> {
         let Some(round) = self.round() else {
             let local = self.at(u.x.into(), u.y.into());
@@ -131,9 +139,9 @@ impl Sphere {
         }
     }
 
-    /// The sphere in world space, if it is whole and still one there.
+    /// The sphere in world space, if it is whole, hides its far side and is still a sphere there.
     fn round(&self) -> Option<RoundSphere> {
-        let scale = self.placement.scale.filter(|_| self.whole)?;
+        let scale = self.placement.scale.filter(|_| self.whole && !self.holed)?;
         Some(RoundSphere { centre: self.placement.world_point(DVec3::ZERO), radius: self.radius * scale })
     }
 
@@ -261,6 +269,7 @@ mod tests {
             ];
             check_sampling(&Shape::Sphere(sphere(&placement, [-1.5, 1.5], 360.0).into()), &from);
             check_sampling(&Shape::Sphere(sphere(&placement, [-0.9, 1.2], 250.0).into()), &from);
+            check_sampling(&Shape::Sphere(sphere(&placement, [-1.5, 1.5], 360.0).with_holes().into()), &from);
         }
     }
 

@@ -10,7 +10,7 @@ use super::load::{self, Part};
 use super::{Loading, Messages, user};
 use crate::interaction::{CurveSet, Instance, Mesh, PatchMesh, Primitives, Surface};
 use crate::light::Emitter;
-use crate::scene::description::{self, AreaLightId, CurveKind};
+use crate::scene::description::{self, AreaLightId, CurveKind, Value};
 use crate::shape::{Patch, Shape, Triangle};
 
 /// The tables under construction.
@@ -46,7 +46,8 @@ impl<'d> Assembly<'d> {
                 };
                 let flipped = load::flipped(shape);
                 let light = shape.area_light.filter(|_| emits);
-                let first_emitter = light.and_then(|light| self.emitters(&primitives, flipped, light, shape, messages));
+                let first_emitter =
+                    light.and_then(|light| self.emitters(&primitives, light, shape, alpha.as_ref(), messages));
                 geometries.push(if alpha.is_some() { geometry.with_hit_filter() } else { geometry });
                 self.surfaces.push(Surface {
                     primitives,
@@ -167,19 +168,24 @@ impl<'d> Assembly<'d> {
     fn emitters(
         &mut self,
         primitives: &Primitives,
-        flipped: bool,
         light: AreaLightId,
         shape: &description::Shape,
+        alpha: Option<&Value<f32>>,
         messages: &mut Messages,
     ) -> Option<u32> {
-        let first = self.emitters.len();
+        let (first, flipped) = (self.emitters.len(), load::flipped(shape));
+        let mut emit = |shapes: &mut dyn Iterator<Item = Option<Shape>>| {
+            let shapes = shapes.flatten().map(|shape| if alpha.is_some() { shape.with_holes() } else { shape });
+            let emitter = |shape: Shape| Emitter { face_area: shape.area(), shape, alpha: alpha.cloned(), light };
+            self.emitters.extend(shapes.map(emitter));
+        };
         match primitives {
             Primitives::Triangles(mesh) => {
-                self.emit(light, triangles(mesh, flipped));
+                emit(&mut triangles(mesh, flipped));
                 join_halves(self.emitters.get_mut(first + mesh.first_quad_half as usize..).unwrap_or_default());
             }
-            Primitives::Patches(mesh) => self.emit(light, patches(mesh, flipped)),
-            Primitives::Quadric(shape) => self.emit(light, std::iter::once(Some((**shape).clone()))),
+            Primitives::Patches(mesh) => emit(&mut patches(mesh, flipped)),
+            Primitives::Quadric(shape) => emit(&mut std::iter::once(Some((**shape).clone()))),
             Primitives::Curves(_) => return None,
         }
         // The numbers of emitters are those of primitives: `load` keeps none that cannot emit.
@@ -187,11 +193,6 @@ impl<'d> Assembly<'d> {
             messages.error(shape.span, "an emitting face of this shape has no area");
         }
         Some(first as u32)
-    }
-
-    fn emit(&mut self, light: AreaLightId, shapes: impl Iterator<Item = Option<Shape>>) {
-        let emitter = |shape: Shape| Emitter { face_area: shape.area(), shape, light };
-        self.emitters.extend(shapes.flatten().map(emitter));
     }
 }
 
