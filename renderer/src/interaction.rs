@@ -20,7 +20,7 @@ use std::ops::Range;
 use embree::{CommittedScene, Hit};
 use glam::{Vec2, Vec3};
 
-pub use alpha::AlphaTest;
+pub use alpha::{Alpha, AlphaTest};
 pub use instance::Instance;
 pub use rounding::TriangleTest;
 pub use surface::{CurveSet, Mesh, PatchMesh, Primitives, Surface};

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 pub use crate::interaction::{AlphaTest, Geometry};
 
-use crate::interaction::TriangleTest;
+use crate::interaction::{Alpha, TriangleTest};
 use crate::light::Emitter;
 use crate::scene::Span;
 use crate::scene::description::{MaterialKind, Scene, Shape, Value};
@@ -164,7 +164,7 @@ fn load_all<'s>(
 struct Loading<'s> {
     shape: &'s Shape,
     /// The alpha that hits are tested with, if they are.
-    alpha: Option<Value<f32>>,
+    alpha: Option<Alpha>,
     emits: bool,
     parts: Vec<Part>,
 }
@@ -198,7 +198,7 @@ impl<'s> Loading<'s> {
                 }
                 return None;
             }
-            alpha => Some(alpha),
+            value => Some(Alpha { by_uv: textures.is_none_or(|textures| textures.follows_uv(&value)), value }),
         };
         // Between media that are not rendered, an interface is nothing.
         let interface = matches!(scene.materials[shape.material.index()].kind, MaterialKind::Interface);

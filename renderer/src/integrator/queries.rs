@@ -42,12 +42,12 @@ pub struct AlphaTested<'w> {
 impl Queries for AlphaTested<'_> {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.scene.intersect_filtered(&embree_ray(ray), &self.alpha)
+        self.scene.intersect_filtered(&embree_ray(ray), &|hit: &Hit| self.alpha.accepts(ray, hit))
     }
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        self.scene.occluded_filtered(&embree_ray(ray), &self.alpha)
+        self.scene.occluded_filtered(&embree_ray(ray), &|hit: &Hit| self.alpha.accepts(ray, hit))
     }
 }
 

@@ -1,11 +1,22 @@
 //! Surfaces with holes: hits that count with a probability.
 
-use embree::{Hit, HitFilter};
+use embree::Hit;
 use glam::Vec2;
 
 use super::Geometry;
+use crate::math::Ray;
 use crate::sampling::mix64;
+use crate::scene::description::Value;
 use crate::texture::{TexturePoint, Textures};
+
+/// Probability of the points of a surface being there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alpha {
+    /// The probability: from 1 on all are there, below 0 none.
+    pub value: Value<f32>,
+    /// It follows the texture coordinates alone, so that a hit's place need not be found.
+    pub by_uv: bool,
+}
 
 /// Decides by a surface's alpha texture whether a hit is real.
 ///
@@ -19,13 +30,19 @@ pub struct AlphaTest<'w> {
     pub textures: &'w Textures,
 }
 
-impl HitFilter for AlphaTest<'_> {
-    fn accept(&self, hit: &Hit) -> bool {
+impl AlphaTest<'_> {
+    /// Whether a hit of `ray` is real.
+    pub fn accepts(&self, ray: &Ray, hit: &Hit) -> bool {
         let (geometry, _) = self.geometry.locate(hit);
         let surface = &self.geometry.surfaces[geometry as usize];
         let Some(alpha) = &surface.alpha else { return true };
-        let uv = surface.primitives.uv(hit.primitive, Vec2::new(hit.u, hit.v));
-        let alpha = self.textures.float(alpha, &TexturePoint { uv, ..TexturePoint::default() });
+        let at = if alpha.by_uv {
+            let uv = surface.primitives.uv(hit.primitive, Vec2::new(hit.u, hit.v));
+            TexturePoint { uv, ..TexturePoint::default() }
+        } else {
+            self.geometry.interaction(ray, hit).texture_point(0.0)
+        };
+        let alpha = self.textures.float(&alpha.value, &at);
         // 1 is always real and 0 never: the threshold is in [0, 1).
         alpha > threshold(hit)
     }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use embree::{TriangleIndices, VertexBuffer};
 use glam::{Vec2, Vec3};
 
+use super::Alpha;
 use super::local::bilinear;
 use crate::math::gamma;
 use crate::scene::Span;
-use crate::scene::description::{CurveKind, MaterialId, Value};
+use crate::scene::description::{CurveKind, MaterialId};
 use crate::shape::curve::Segments;
 use crate::shape::{Shape, patch, triangle};
 
@@ -22,7 +23,7 @@ pub struct Surface {
     /// Number of its first primitive's emitter, if it emits; the others follow.
     pub first_emitter: Option<u32>,
     /// Probability of a hit being real; `None`: all are.
-    pub alpha: Option<Value<f32>>,
+    pub alpha: Option<Alpha>,
     /// Normals without vertex normals point to the side from which the primitives are wound clockwise.
     pub flipped: bool,
     /// Where it was described.

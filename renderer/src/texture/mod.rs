@@ -135,6 +135,28 @@ impl Textures {
         }
     }
 
+    /// Whether texture coordinates and their change are all that a value looks at.
+    pub fn follows_uv<T>(&self, value: &Value<T>) -> bool {
+        let uv = |map: &Map2| matches!(map, Map2::Uv { .. });
+        let all = |values: &[Value<Rgb>; 2]| values.iter().all(|value| self.follows_uv(value));
+        let Value::Texture(id) = value else { return true };
+        match &self.nodes[id.index()] {
+            Node::Constant(_) => true,
+            Node::Scale { tex, scale } => self.follows_uv(tex) && self.follows_uv(scale),
+            Node::Mix { tex, amount } => all(tex) && self.follows_uv(amount),
+            Node::Bilerp { map, .. } => uv(map),
+            Node::Image(image) => uv(&image.map),
+            Node::Checkerboard { tex, map: Map::Two(map) } => uv(map) && all(tex),
+            Node::Dots { inside, outside, map } => uv(map) && self.follows_uv(inside) && self.follows_uv(outside),
+            Node::Checkerboard { map: Map::Three(_), .. }
+            | Node::DirectionMix { .. }
+            | Node::Fbm { .. }
+            | Node::Wrinkled { .. }
+            | Node::Windy { .. }
+            | Node::Marble { .. } => false,
+        }
+    }
+
     /// Bytes that the images take.
     pub fn bytes(&self) -> usize {
         self.pyramids.iter().map(|pyramid| pyramid.bytes()).sum()

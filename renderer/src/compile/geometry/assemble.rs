@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::load::{self, Part};
 use super::{Loading, Messages, user};
-use crate::interaction::{CurveSet, Instance, Mesh, PatchMesh, Primitives, Surface};
+use crate::interaction::{Alpha, CurveSet, Instance, Mesh, PatchMesh, Primitives, Surface};
 use crate::light::Emitter;
-use crate::scene::description::{self, AreaLightId, CurveKind, Value};
+use crate::scene::description::{self, AreaLightId, CurveKind};
 use crate::shape::{Patch, Shape, Triangle};
 
 /// The tables under construction.
@@ -170,13 +170,18 @@ impl<'d> Assembly<'d> {
         primitives: &Primitives,
         light: AreaLightId,
         shape: &description::Shape,
-        alpha: Option<&Value<f32>>,
+        alpha: Option<&Alpha>,
         messages: &mut Messages,
     ) -> Option<u32> {
         let (first, flipped) = (self.emitters.len(), load::flipped(shape));
         let mut emit = |shapes: &mut dyn Iterator<Item = Option<Shape>>| {
             let shapes = shapes.flatten().map(|shape| if alpha.is_some() { shape.with_holes() } else { shape });
-            let emitter = |shape: Shape| Emitter { face_area: shape.area(), shape, alpha: alpha.cloned(), light };
+            let emitter = |shape: Shape| Emitter {
+                face_area: shape.area(),
+                shape,
+                alpha: alpha.map(|alpha| alpha.value.clone()),
+                light,
+            };
             self.emitters.extend(shapes.map(emitter));
         };
         match primitives {

@@ -353,8 +353,9 @@ fn alpha_textures_make_holes_and_fractions_make_them_at_random() {
     for _ in 0..n {
         let p = points.square();
         let ray = embree::Ray::new(p.extend(1.0), Vec3::NEG_Z);
-        let hit = geometry.scene().intersect_filtered(&ray, &test);
-        assert_eq!(geometry.scene().occluded_filtered(&ray, &test), hit.is_some());
+        let accept = |hit: &embree::Hit| test.accepts(&Ray::new(ray.origin, ray.direction), hit);
+        let hit = geometry.scene().intersect_filtered(&ray, &accept);
+        assert_eq!(geometry.scene().occluded_filtered(&ray, &accept), hit.is_some());
         let hole = (p.x < 0.5) == (p.y < 0.5);
         assert!(!(hole && hit.is_some()), "{p}");
         solid += u32::from(hit.is_some());
@@ -362,6 +363,61 @@ fn alpha_textures_make_holes_and_fractions_make_them_at_random() {
     // An eighth of the square, within four standard deviations of the binomial distribution.
     let (mean, deviation) = (f64::from(n) / 8.0, (f64::from(n) * 0.125 * 0.875).sqrt());
     assert!((f64::from(solid) - mean).abs() < 4.0 * deviation, "{solid}");
+}
+
+#[test]
+fn alpha_textures_are_looked_up_where_the_hit_is() {
+    // Squares of side 1/2 in the world's x and y: every other one is a hole.
+    let (vs, vt, delta) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec2::ZERO);
+    let mapping = Mapping::Two(Mapping2D::Planar { texture_from_world: Transform::default(), vs, vt, delta });
+    let checks = TextureKind::Checkerboard { mapping, tex: [Value::Constant(Rgb::ZERO), Value::Constant(Rgb::ONE)] };
+    let texture = Texture { name: "checks".into(), kind: checks, span: Span::default() };
+    let textures = Textures::build(std::slice::from_ref(&texture)).unwrap().0;
+    let curve = |kind| Curve {
+        kind,
+        control: vec![[0.0, 1.0, 2.0, 3.0].map(|x| Vec3::X * x)],
+        normals: vec![],
+        width: [2.0; 2],
+    };
+    let bent = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.4)];
+    let kinds = [
+        ShapeKind::Triangles(square()),
+        ShapeKind::Sphere { radius: 1.5, z_min: -1.5, z_max: 1.5, phi_max: 360.0 },
+        ShapeKind::Bilinear(BilinearMesh { indices: vec![[0, 1, 2, 3]], positions: bent, ..Default::default() }),
+        ShapeKind::Curve(curve(CurveKind::Flat)),
+        ShapeKind::Curve(curve(CurveKind::Cylinder)),
+    ];
+    let mut points = Points::new(6);
+    for (kind, instanced) in kinds.iter().flat_map(|kind| [(kind, false), (kind, true)]) {
+        let masked = Shape { alpha: Some(Value::Texture(TextureId(0))), ..shape(kind.clone()) };
+        let place = Transform::new(DMat4::from_translation(DVec3::new(0.7, 0.2, 0.0)) * DMat4::from_rotation_z(0.4));
+        let object = Object { name: "o".into(), shapes: vec![masked.clone()], span: Span::default() };
+        let copy = Instance { object: ObjectId(0), world_from_object: place, span: Span::default() };
+        let scene =
+            if instanced { scene(vec![], vec![object], vec![copy]) } else { scene(vec![masked], vec![], vec![]) };
+        let ((geometry, _), _) = try_build(&Scene { textures: vec![texture.clone()], ..scene }).unwrap();
+        let test = AlphaTest { geometry: &geometry, textures: &textures };
+        let (mut solid, mut holes) = (0, 0);
+        for _ in 0..2000 {
+            let target = random_vec3(&mut points) * 2.0;
+            let ray = Ray::new(target + (random_vec3(&mut points) + Vec3::Z * 3.0) * 4.0, Vec3::ZERO);
+            let ray = Ray::new(ray.origin, target - ray.origin);
+            let Some(first) = trace(&geometry, &ray) else { continue };
+            let there = |p: Vec3| ((2.0 * p.x).floor() as i32 + (2.0 * p.y).floor() as i32) & 1 == 1;
+            let query = embree::Ray::new(ray.origin, ray.direction);
+            let accept = |hit: &embree::Hit| test.accepts(&ray, hit);
+            let hit = geometry.scene().intersect_filtered(&query, &accept);
+            assert_eq!(geometry.scene().occluded_filtered(&query, &accept), hit.is_some());
+            let seen = hit.map(|hit| geometry.interaction(&ray, &hit));
+            assert!(seen.is_none_or(|seen| there(seen.point.p)), "{kind:?}, instanced: {instanced}");
+            match there(first.point.p) {
+                true => assert_eq!(seen.map(|seen| seen.t), Some(first.t), "{kind:?}, instanced: {instanced}"),
+                false => holes += 1,
+            }
+            solid += u32::from(seen.is_some());
+        }
+        assert!(solid > 30 && holes > 30, "{solid} and {holes} of {kind:?}, instanced: {instanced}");
+    }
 }
 
 #[test]
