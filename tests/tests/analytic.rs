@@ -156,3 +156,14 @@ fn emitters_with_holes_light_by_what_is_left_of_them() {
         }
     }
 }
+
+#[test]
+fn a_mix_by_direction_follows_the_surface_and_not_its_shading() {
+    // White where the surface faces up, whatever vertex normals say: under a white sky it is as bright as that.
+    let world = "LightSource \"infinite\" \"rgb L\" [1 1 1]\n\
+        Texture \"d\" \"spectrum\" \"directionmix\" \"rgb tex1\" [1 1 1] \"rgb tex2\" [0 0 0] \"vector3 dir\" [0 0 1]\n\
+        Material \"diffuse\" \"texture reflectance\" \"d\"\n\
+        Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 1 -1 0 0 1 0] \"normal N\" [0.8 0 0.6 0.8 0 0.6 0.8 0 0.6]\n";
+    let (mean, error) = small(&SceneFile::new(&down(0.5, 1, world)), 64, Techniques::Both);
+    assert!((mean - 1.0).abs() <= Z * error + 1e-5, "{mean} ± {error}");
+}

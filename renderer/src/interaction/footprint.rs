@@ -26,7 +26,7 @@ impl SurfaceInteraction<'_> {
         let half_axis = if half_axis.is_finite() { half_axis } else { radius };
         let (dpdx, dpdy) = (2.0 * half_axis * s, 2.0 * radius * self.ng.cross(s));
         let (duvdx, duvdy) = if radius > 0.0 { self.uv_changes(dpdx, dpdy) } else { Default::default() };
-        TexturePoint { p: self.point.p, n: self.ns, uv: self.uv(), dpdx, dpdy, duvdx, duvdy }
+        TexturePoint { p: self.point.p, n: self.ng, uv: self.uv(), dpdx, dpdy, duvdx, duvdy }
     }
 
     /// The changes of (u, v) along two tangents.

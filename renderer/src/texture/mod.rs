@@ -37,7 +37,7 @@ use mapping::{Map, Map2, map3};
 pub struct TexturePoint {
     /// Position.
     pub p: Vec3,
-    /// Unit shading normal.
+    /// Unit geometric normal.
     pub n: Vec3,
     /// Surface parameters.
     pub uv: Vec2,
