@@ -79,7 +79,15 @@ impl<'w> CoatedDiffuse<'w> {
     }
 
     pub(super) fn regularized(self) -> Self {
-        Self::new(self.albedo, self.coat.regularized())
+        let coat = self.coat.regularized();
+        if coat.ggx == self.coat.ggx {
+            return self;
+        }
+        // Through another width the base sends back as much more or less as it would by RGB: what summing by wavelength
+        // makes of that hardly depends on the width.
+        let (old, new) = (Self::new(self.albedo, self.coat).base, Self::new(self.albedo, coat).base);
+        let more = Rgb::select(old.cmpgt(Rgb::ZERO), new / old, Rgb::ONE);
+        Self::with_response(self.albedo, self.base * more, coat)
     }
 
     /// Probability of choosing the coat's reflection: by energy.

@@ -91,3 +91,23 @@ fn a_coated_metal_has_the_walk_s_albedo() {
         }
     }
 }
+
+#[test]
+fn regularising_keeps_what_was_summed_by_wavelength() {
+    let albedo = Rgb::new(0.8, 0.5, 0.1);
+    for alpha in COATS.alphas() {
+        let coat = Coat::new(Ggx::isotropic(alpha), &COATS.entry(alpha).coat);
+        let by_rgb = COATS.diffuse(alpha, albedo);
+        let by_wavelength = Bsdf::CoatedDiffuse(CoatedDiffuse::with_response(albedo, Rgb::new(0.5, 0.3, 0.02), coat));
+        let wo = direction(0.6, 0.2);
+        let more = |roughen: fn(Bsdf<'static>) -> Bsdf<'static>| {
+            roughen(by_wavelength).diffuse_albedo(wo) / roughen(by_rgb).diffuse_albedo(wo)
+        };
+        let (before, after) = (more(|bsdf| bsdf), more(Bsdf::regularized));
+        assert!((after / before - 1.0).abs().max_element() < 1e-5, "{alpha}: {after} instead of {before}");
+        if alpha > 0.3 {
+            let wi = direction(0.4, 2.0);
+            assert_eq!(by_wavelength.regularized().eval_pdf(wo, wi), by_wavelength.eval_pdf(wo, wi), "{alpha}");
+        }
+    }
+}
