@@ -15,7 +15,7 @@ pub const DEFAULT_UV: [Vec2; 4] = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE];
 
 /// A bilinear patch that emits.
 ///
-/// Its normal is ∂p/∂u × ∂p/∂v, flipped if asked; vertex normals decide the side instead where there are any.
+/// Its normal is ∂p/∂u × ∂p/∂v, flipped if asked; vertex normals decide the side instead where they do not vanish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     corners: Corners,
@@ -104,11 +104,9 @@ impl Patch {
     }
 
     fn oriented(&self, DVec2 { x: u, y: v }: DVec2, normal: DVec3) -> DVec3 {
-        let flip = match &self.normals {
-            Some(normals) => at(normals, u, v).dot(normal) < 0.0,
-            None => self.flipped,
-        };
-        if flip { -normal } else { normal }
+        let normal = if self.flipped { -normal } else { normal };
+        let against = self.normals.as_ref().is_some_and(|normals| at(normals, u, v).dot(normal) < 0.0);
+        if against { -normal } else { normal }
     }
 }
 
@@ -278,6 +276,19 @@ mod tests {
         assert!((area(&rectangle) - 6.0).abs() < 1e-6);
         assert_eq!(Patch::new(rectangle, None, None, false).unwrap().normal_cone().0, Vec3::Z);
         assert!(Patch::new([Vec3::ZERO; 4], None, None, false).is_none());
+    }
+
+    #[test]
+    fn the_side_follows_the_vertex_normals_unless_they_vanish() {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(1.0, 1.0, 0.0)];
+        let side = |normals, flipped| {
+            let patch = Patch::new(corners, None, normals, flipped).unwrap();
+            patch.sample(Vec3::new(0.2, 0.2, 1.0), Vec2::splat(0.5)).unwrap().n
+        };
+        for flipped in [false, true] {
+            assert_eq!(side(Some([Vec3::NEG_Z; 4]), flipped), Vec3::NEG_Z);
+            assert_eq!(side(Some([Vec3::ZERO; 4]), flipped), side(None, flipped));
+        }
     }
 
     proptest! {

@@ -39,7 +39,7 @@ pub const DEFAULT_UV: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::ONE];
 
 impl Triangle {
     /// The triangle `p`, counter-clockwise seen from the side of its normal, or from the other side when `flipped`.
-    /// Vertex normals, where there are any, decide the side instead; `flipped` is then already in them.
+    /// Vertex normals, where they do not vanish, decide the side instead; `flipped` is then already in them.
     ///
     /// `None`: no area, or not finite.
     pub fn new(p: [Vec3; 3], uv: Option<[Vec2; 3]>, normals: Option<[Vec3; 3]>, flipped: bool) -> Option<Self> {
@@ -55,10 +55,8 @@ impl Triangle {
         let (a, b) = (e1.abs(), e2.abs());
         let products = DVec3::new(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
         let n = (cross / doubled_area).as_vec3();
-        let (n, facing) = match normals {
-            Some(normals) => (n, normals.map(|normal| normal.dot(n))),
-            None => (if flipped { -n } else { n }, [1.0; 3]),
-        };
+        let n = if flipped { -n } else { n };
+        let facing = normals.map_or([1.0; 3], |normals| normals.map(|normal| normal.dot(n)));
         let tilt = gamma(4) * (products.length() / doubled_area) as f32;
         let longest = e1.length_squared().max(e2.length_squared()).max((p2 - p1).length_squared()) as f32;
         let centroid = ((p0 + p1 + p2) / 3.0).as_vec3();
@@ -263,7 +261,10 @@ mod tests {
         };
         assert_eq!(sample(None, false), Vec3::Z);
         assert_eq!(sample(None, true), Vec3::NEG_Z);
-        assert_eq!(sample(Some([Vec3::NEG_Z; 3]), false), Vec3::NEG_Z);
+        for flipped in [false, true] {
+            assert_eq!(sample(Some([Vec3::NEG_Z; 3]), flipped), Vec3::NEG_Z);
+            assert_eq!(sample(Some([Vec3::ZERO; 3]), flipped), sample(None, flipped));
+        }
     }
 
     #[test]
