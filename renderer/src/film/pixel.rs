@@ -71,12 +71,15 @@ pub struct Pixel {
     hits: u32,
 }
 
-/// Quanta of weights: 2⁻³⁶, so that 2²³ weights of up to 16 fit.
+/// Quanta of weights: 2⁻³⁶, so that 2²³ weights below 16 fit.
 const WEIGHT_BITS: i32 = 36;
+
+/// The largest weight: the number below 16, as 2²³ times 16 would be 2⁶³ quanta, one more than there are.
+const LARGEST_WEIGHT: f32 = 16.0 - 8.0 * f32::EPSILON;
 
 /// A weight in quanta.
 pub(super) fn quanta(weight: f32) -> i64 {
-    (f64::from(weight.clamp(-16.0, 16.0)) * 2f64.powi(WEIGHT_BITS)).round() as i64
+    (f64::from(weight.clamp(-LARGEST_WEIGHT, LARGEST_WEIGHT)) * 2f64.powi(WEIGHT_BITS)).round() as i64
 }
 
 /// A number of quanta as a weight.
@@ -225,6 +228,13 @@ mod tests {
         let mut pixel = Pixel::default();
         (0..16).for_each(|k| pixel.add(&taken(k, Rgb::ONE, if k % 8 == 0 { -1.25 } else { 1.25 })));
         assert_eq!(pixel.mean(), DVec3::ONE);
+    }
+
+    #[test]
+    fn as_many_of_the_largest_weights_fit_as_there_may_be_samples() {
+        for weight in [16.0, f32::INFINITY, -16.0, f32::NEG_INFINITY] {
+            assert!(quanta(weight).checked_mul(crate::film::MOST_TERMS as i64).is_some(), "{weight}");
+        }
     }
 
     #[test]
