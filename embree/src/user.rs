@@ -23,7 +23,8 @@ pub trait UserGeometry: Send + Sync {
     /// Lower and upper corner of a box around a primitive; asked once for each.
     fn bounds(&self, primitive: u32) -> (Vec3, Vec3);
 
-    /// The closest hit with `t` inside the closed range, or `None`; hits outside of it are ignored.
+    /// The closest hit with `t` in the range, of which the lower end may be left out, or `None`; hits outside of it are
+    /// ignored.
     ///
     /// `direction` is not of unit length, and `t` counts in its lengths.
     fn intersect(&self, primitive: u32, origin: Vec3, direction: Vec3, t_range: (f32, f32)) -> Option<UserHit>;

@@ -34,7 +34,8 @@ pub struct World {
     pub techniques: Techniques,
 }
 
-/// Which techniques find the lights. Each is unbiased; that they agree is a test of all three.
+/// Which techniques find the lights. Each is unbiased where no emitting surfaces share a place; that they agree is a test of
+/// all three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Techniques {
     /// Light samples and BSDF samples, weighted against each other.

@@ -55,11 +55,11 @@ pub fn build(
     options: &Options,
 ) -> Result<Result<((Geometry, Vec<Emitter>), Vec<Message>), Vec<Message>>, embree::Error> {
     let mut messages = Messages::default();
-    let placed = load_all(scene, &scene.shapes, textures, false, &mut messages);
+    let placed = load_all(scene, &scene.shapes, textures, &mut messages);
     let objects: Vec<_> = instanced_objects(scene)
         .map(|(index, instanced)| {
             let shapes = if instanced { &scene.objects[index].shapes[..] } else { &[] };
-            load_all(scene, shapes, textures, true, &mut messages)
+            load_all(scene, shapes, textures, &mut messages)
         })
         .collect();
     messages.summarise_degenerate();
@@ -135,11 +135,10 @@ fn load_all<'s>(
     scene: &Scene,
     shapes: &'s [Shape],
     textures: Option<&Textures>,
-    instanced: bool,
     messages: &mut Messages,
 ) -> Vec<Loading<'s>> {
     let visible: Vec<Loading<'s>> =
-        shapes.iter().filter_map(|shape| Loading::new(scene, shape, textures, instanced, messages)).collect();
+        shapes.iter().filter_map(|shape| Loading::new(scene, shape, textures, messages)).collect();
     let loaded: Vec<Result<Loaded, String>> =
         visible.par_iter().map(|loading| load::load(loading.shape, loading.emits)).collect();
     let mut result: Vec<Loading<'s>> = Vec::with_capacity(visible.len());
@@ -171,23 +170,12 @@ struct Loading<'s> {
 
 impl<'s> Loading<'s> {
     /// `None`: nothing of the shape will be seen.
-    fn new(
-        scene: &Scene,
-        shape: &'s Shape,
-        textures: Option<&Textures>,
-        instanced: bool,
-        messages: &mut Messages,
-    ) -> Option<Self> {
+    fn new(scene: &Scene, shape: &'s Shape, textures: Option<&Textures>, messages: &mut Messages) -> Option<Self> {
         let alpha = match &shape.alpha {
             Some(value) => textures.map_or_else(|| value.clone(), |textures| textures.folded_float(value)),
             None => Value::Constant(1.0),
         };
-        let mut emits = shape.area_light.is_some();
-        if emits && instanced {
-            messages
-                .warn(shape.span, "area lights of object instances do not emit, as in pbrt: drawn without emission");
-            emits = false;
-        }
+        let emits = shape.area_light.is_some();
         let alpha = match alpha {
             Value::Constant(alpha) if alpha >= 1.0 => None,
             Value::Constant(alpha) if alpha <= 0.0 || alpha.is_nan() => {

@@ -28,7 +28,7 @@ pub struct Image {
     pub channels: Vec<Channel>,
     /// Values.
     pub values: Vec<f32>,
-    /// Pixels that a filter's negative lobes had made negative, and that are written as 0.
+    /// Pixels that a filter's negative lobes or the sensor's response had made negative, and that are written as 0.
     pub clamped_negative: u64,
 }
 

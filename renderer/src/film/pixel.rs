@@ -154,7 +154,8 @@ impl Pixel {
         self.hits.into()
     }
 
-    /// The pixel's value, film RGB; negative only if the filter has negative lobes. Zero without samples.
+    /// The pixel's value, film RGB; negative only if the filter has negative lobes or the sensor's response does, as that of a
+    /// white balance may. Zero without samples.
     ///
     /// The sum of the weights normalises, not the number of samples: their ratio tends to one, and the ratio estimator
     /// leaves a constant image constant. Where few samples of a negative-lobed filter cancel, the number serves.

@@ -61,7 +61,7 @@ pub struct Path<'w, R> {
     sample: Sample,
     /// What the ray has met.
     hit: Option<Hit>,
-    /// Where that is; `None` also where a material lets the ray pass: an interface that emits or is part of a mix.
+    /// Where that is; `None` also where the material lets the ray pass, as a mix with an interface may.
     place: Option<Place<'w>>,
 }
 

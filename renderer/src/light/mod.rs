@@ -6,8 +6,9 @@
 //!
 //! # Invariants
 //! Densities are per solid angle at the receiver, in sr⁻¹, and include the probability of choosing the light. Cosines at
-//! the receiver are the caller's. What [`Lights::emitter_pdf`] and [`Lights::escaped`] say of a direction is what
-//! [`Lights::sample`] would have had there: the weights of both sum to 1.
+//! the receiver are the caller's. What [`Lights::emitter_pdf`] says of a point and [`Lights::escaped`] of a direction is
+//! what [`Lights::sample`] would have had there: the weights of both sum to 1, but for emitting surfaces in one place, of
+//! which a sample may choose any and a ray hits one.
 
 mod area;
 mod bounds;

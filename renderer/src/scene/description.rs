@@ -566,7 +566,7 @@ pub enum LightKind {
         image: Option<PathBuf>,
         /// Irradiance on an upward surface that overrides the level.
         illuminance: Option<f32>,
-        /// Corners of a portal, through which alone the light comes. Empty: none.
+        /// Corners of a portal, through which alone the light comes. Empty: none. Not rendered.
         portal: Vec<Vec3>,
     },
     /// A point with an equal-area goniometric image.
@@ -757,7 +757,7 @@ pub enum CurveKind {
 pub struct Object {
     /// Its name in the file.
     pub name: Arc<str>,
-    /// Its shapes, in object space.
+    /// Its shapes, in object space. They have no area lights.
     pub shapes: Vec<Shape>,
     /// Where it was described.
     pub span: Span,

@@ -256,19 +256,6 @@ fn instances_look_like_the_object_moved_there() {
 }
 
 #[test]
-fn area_lights_of_instances_are_left_out_with_a_warning() {
-    let lamp = Shape { area_light: Some(AreaLightId(0)), ..shape(ShapeKind::Triangles(square())) };
-    let object = |name: &str| Object { name: name.into(), shapes: vec![lamp.clone()], span: Span::default() };
-    let place =
-        |object| Instance { object: ObjectId(object), world_from_object: Transform::default(), span: Span::default() };
-    // The second object is never placed, so nothing is said about it.
-    let scene = scene(vec![], vec![object("a"), object("b")], vec![place(0), place(0)]);
-    let ((geometry, emitters), warnings) = try_build(&scene).unwrap();
-    assert!(emitters.is_empty());
-    assert_eq!((warnings.len(), geometry.surfaces().len(), geometry.instances().len()), (1, 1, 2));
-}
-
-#[test]
 fn flat_quads_keep_the_parameters_of_their_patch() {
     let corners = [Vec3::ZERO, Vec3::X * 2.0, Vec3::Y, Vec3::new(2.0, 1.0, 0.0)];
     let bent = [Vec3::ZERO, Vec3::X * 2.0, Vec3::Y, Vec3::new(2.0, 1.0, 0.4)];

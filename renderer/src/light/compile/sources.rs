@@ -71,11 +71,7 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
                 };
                 self.infinite(Infinite::Distant { irradiance, wi }, irradiance == Rgb::ZERO)
             }
-            LightKind::Infinite { radiance, image, illuminance, portal } => {
-                if !portal.is_empty() {
-                    let what = "portals are not rendered: the environment lights the scene from all directions";
-                    self.warnings.push((span, what.to_owned()));
-                }
+            LightKind::Infinite { radiance, image, illuminance, portal: _ } => {
                 let radiance = self.sane(*radiance, span);
                 match image {
                     Some(path) => self.environment(&at, path, radiance, *illuminance),

@@ -219,7 +219,7 @@ impl Reader {
     }
 
     fn open(&mut self, block: Block, name: &str, span: Span) {
-        // A thousand levels are more than any scene has, and as many as a file of nothing else may cost.
+        // More levels than any scene has, and as many as a file of nothing else may cost.
         const DEEPEST: usize = 10_000;
         self.only_in_world(name, span);
         if self.stack.len() == DEEPEST {

@@ -452,3 +452,14 @@ fn names_defined_in_a_long_chain_backwards_do_not_overflow_the_stack() {
     assert!(parse(text.as_bytes(), Path::new(""), "test.pbrt").is_err());
     assert!(parse("AttributeBegin ".repeat(100_000).as_bytes(), Path::new(""), "test.pbrt").is_err());
 }
+
+#[test]
+fn what_does_not_shine_as_described_is_warned_of_once() {
+    let text = "WorldBegin LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]
+        AreaLightSource \"diffuse\" ObjectBegin \"o\" Shape \"sphere\" Shape \"disk\" ObjectEnd ObjectInstance \"o\"";
+    let (scene, warnings) = parse(text.as_bytes(), Path::new(""), "test.pbrt").unwrap();
+    assert!(scene.objects[0].shapes.iter().all(|shape| shape.area_light.is_none()));
+    let texts: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(texts.len(), 2, "{texts:?}");
+    assert!(texts[0].contains("portals are not rendered") && texts[1].contains("do not shine"), "{texts:?}");
+}
