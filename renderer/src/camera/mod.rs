@@ -15,7 +15,7 @@ pub use pixels::rendered_pixels;
 
 use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, Vec2, Vec3, Vec3A};
 
-use crate::math::{Ray, warp};
+use crate::math::{Ray, octahedral, warp};
 use crate::scene::Span;
 use crate::scene::description::{self, CameraKind};
 
@@ -139,7 +139,7 @@ impl Camera {
                 self.along(Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi), Vec2::ZERO, cone)
             }
             Projection::EqualArea { square_from_film, cone } => {
-                let d = equal_area::sphere_from_square(equal_area::wrap(film * *square_from_film));
+                let d = octahedral::direction_from_square(equal_area::wrap(film * *square_from_film));
                 self.along(Vec3::new(d.x, d.z, d.y), Vec2::ZERO, *cone)
             }
         })

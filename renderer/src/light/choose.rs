@@ -1,5 +1,7 @@
 //! A choice among few, in proportion to their weights.
 
+use crate::math::BELOW_ONE;
+
 /// What was chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
@@ -30,7 +32,7 @@ pub fn choose<const N: usize>(weights: &[f32; N], u: f32) -> Option<Choice> {
     // ends is anyone's guess. What has no weight ends where it begins and is never the first that is left.
     let ended = ends.iter().map(|&end| u32::from(end <= target)).sum::<u32>() as usize;
     let index = if ended < N { ended } else { last(weights)? };
-    let rest = ((target - begins[index]) / weights[index]).clamp(0.0, super::BELOW_ONE);
+    let rest = ((target - begins[index]) / weights[index]).clamp(0.0, BELOW_ONE);
     Some(Choice { index, pmf: weights[index] / sum, rest })
 }
 
@@ -43,6 +45,7 @@ fn last(weights: &[f32]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::{Choice, choose};
+    use crate::math::BELOW_ONE;
 
     #[test]
     fn shares_are_in_proportion_and_rescaled() {
@@ -58,7 +61,7 @@ mod tests {
     fn what_has_no_weight_is_never_chosen() {
         // Sums that round: the last share ends before the sum of all.
         let weights = [0.1, 0.2, 0.3, 1e-9, 0.0];
-        for u in [0.0, 0.5, super::super::BELOW_ONE] {
+        for u in [0.0, 0.5, BELOW_ONE] {
             let Choice { index, rest, .. } = choose(&weights, u).unwrap();
             assert!(weights[index] > 0.0 && (0.0..1.0).contains(&rest));
         }

@@ -18,7 +18,7 @@ use crate::scene::Span;
 use crate::scene::description::{self, AreaLightId, Value};
 use crate::shape::Shape;
 use crate::texture::RgbImage;
-use crate::texture::image::{Channels, load_texels};
+use crate::texture::image::load_rgb;
 
 /// A message and the place in the scene file that it is about.
 pub type Message = (Span, String);
@@ -49,10 +49,10 @@ impl Lights {
         emitters: Vec<Emitter>,
         scene_bounds: (Vec3, Vec3),
     ) -> Result<(Self, Vec<Message>), Vec<Message>> {
-        Self::build_with(lights, area, emitters, scene_bounds, load)
+        Self::build_with(lights, area, emitters, scene_bounds, load_rgb)
     }
 
-    /// As [`Self::build`], with images from `load`: see [`load`].
+    /// As [`Self::build`], with images from `load`: see [`load_rgb`].
     pub(super) fn build_with(
         lights: &[description::Light],
         area: &[description::AreaLight],
@@ -84,17 +84,6 @@ impl Lights {
 
 /// An image, and how many of its values were not finite and became 0; or why there is none.
 pub(super) type Loaded = Result<(RgbImage, usize), String>;
-
-/// Loads an image file: integers are sRGB, floats are linear.
-fn load(path: &Path) -> Loaded {
-    let texels = load_texels(path, Channels::Rgb, None)?;
-    let rgb = |i: usize| match texels.channels {
-        1 => Rgb::splat(texels.value(i)),
-        _ => Rgb::from_array(std::array::from_fn(|c| texels.value(3 * i + c))),
-    };
-    let pixels = (0..texels.width * texels.height).map(rgb).collect();
-    Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.replaced))
-}
 
 /// The names of all groups, sorted.
 fn groups(lights: &[description::Light], area: &[description::AreaLight]) -> Vec<Arc<str>> {

@@ -7,8 +7,7 @@ use glam::{DMat3, Mat3, Vec2, Vec3};
 use super::choose::{Choice, choose};
 use super::image::LightImage;
 use super::infinite::DirectionSample;
-use super::octahedral;
-use crate::math::{Rgb, luminance};
+use crate::math::{Rgb, luminance, octahedral};
 use crate::sampling::PiecewiseConstant2D;
 
 /// An equal-area octahedral image at infinite distance.

@@ -18,7 +18,6 @@ mod environment;
 mod image;
 mod infinite;
 mod mis;
-mod octahedral;
 mod point;
 #[cfg(test)]
 mod testing;
@@ -31,16 +30,13 @@ use glam::{Vec2, Vec3};
 pub use compile::{Emitter, Message};
 pub use mis::power_heuristic;
 
-use crate::math::{PointWithError, Rgb};
+use crate::math::{BELOW_ONE, PointWithError, Rgb};
 use crate::texture::Textures;
 use area::AreaEmitter;
 use image::LightImage;
 use infinite::Infinite;
 use point::PointLight;
 use tree::LightTree;
-
-/// The largest `f32` below 1.
-const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// All lights of a scene.
 #[derive(Clone, Debug, Default)]

@@ -5,8 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Mat3, Vec2, Vec3};
 
 use super::image::LightImage;
-use super::octahedral;
-use crate::math::Rgb;
+use crate::math::{Rgb, octahedral};
 
 /// A light at one point of the world.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use glam::{DMat4, DVec3};
 
 use super::testing::{Mean, Random};
 use super::*;
-use crate::math::{Frame, Transform, luminance, warp};
+use crate::math::{Frame, Transform, luminance, octahedral, warp};
 use crate::sampling::stats::chi2_p_value;
 use crate::scene::Span;
 use crate::scene::description::{self, AreaLight, AreaLightId, LightKind};

@@ -12,6 +12,9 @@ pub const fn gamma(n: u32) -> f32 {
     n as f32 * MACHINE_EPSILON / (1.0 - n as f32 * MACHINE_EPSILON)
 }
 
+/// The largest `f32` below 1.
+pub const BELOW_ONE: f32 = 1.0 - MACHINE_EPSILON;
+
 /// The next float away from zero; an infinity stays. (`f32::next_up` is younger than our compiler.)
 pub fn next_away_from_zero(x: f32) -> f32 {
     // The bits of a float without its sign count its magnitude.

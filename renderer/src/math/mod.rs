@@ -1,7 +1,8 @@
-//! Vectors, frames, rays with error bounds, and the warps that turn uniform numbers into directions.
+//! Vectors, frames, rays with error bounds, and the maps and warps from squares to directions.
 
 pub mod frame;
 pub mod interval;
+pub mod octahedral;
 pub mod ray;
 pub mod rgb;
 pub mod transform;
@@ -11,7 +12,7 @@ mod wiener;
 pub mod window;
 
 pub use frame::{Frame, LocalDir};
-pub use interval::{PointWithError, gamma, next_away_from_zero, next_towards_zero};
+pub use interval::{BELOW_ONE, PointWithError, gamma, next_away_from_zero, next_towards_zero};
 pub use ray::{Ray, spawn_ray, spawn_segment};
 pub use rgb::{Rgb, luminance};
 pub use transform::Transform;

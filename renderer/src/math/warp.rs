@@ -48,11 +48,6 @@ pub fn uniform_cone(u: Vec2, one_minus_cos: f32) -> Vec3 {
     Vec3::new(r * cos, r * sin, 1.0 - drop)
 }
 
-/// Density (sr⁻¹) of [`uniform_cone`].
-pub fn uniform_cone_pdf(one_minus_cos: f32) -> f32 {
-    1.0 / (2.0 * PI * one_minus_cos)
-}
-
 /// Barycentric coordinates of vertices 0 and 1 of a uniform point in a triangle, without folding strata apart.
 ///
 /// **Source**: \[Heitz19\] "A Low-Distortion Map Between Triangle and Square".

@@ -1,83 +1,46 @@
-//! Piecewise constant distributions over [0, 1) and [0, 1)², built in `f64` from tabulated values.
+//! Piecewise constant distributions over [0, 1)², built in `f64` from tabulated values.
 //!
 //! A value that is negative or not finite counts as 0. A table of zeros is a uniform distribution, so that sampling
-//! never fails; its integral is still 0.
+//! never fails.
 
 use glam::Vec2;
 
-/// A density over [0, 1) that is constant in each of n equal bins.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PiecewiseConstant1D {
-    /// Probability left of bin i: n + 1 values from 0 to 1.
-    cdf: Box<[f32]>,
-    /// Where to look in it: see [`push_index`].
-    index: Box<[u32]>,
-    /// Density in bin i.
-    density: Box<[f32]>,
-    integral: f64,
-}
-
-impl PiecewiseConstant1D {
-    /// The density proportional to `values`; `None` if there are none.
-    pub fn new(values: &[f32]) -> Option<Self> {
-        Self::from_sums(values.iter().map(|&v| usable(v)))
-    }
-
-    fn from_sums(values: impl ExactSizeIterator<Item = f64> + Clone) -> Option<Self> {
-        if values.len() == 0 {
-            return None;
-        }
-        let mut cdf = Vec::with_capacity(values.len() + 1);
-        let sum = push_cdf(values.clone(), &mut cdf);
-        let bins = values.len() as f64;
-        let density = values.map(|v| if sum > 0.0 { (v / sum * bins) as f32 } else { 1.0 }).collect();
-        let mut index = Vec::new();
-        push_index(&cdf, &mut index);
-        Some(Self { cdf: cdf.into(), index: index.into(), density, integral: sum / bins })
-    }
-
-    /// The integral over [0, 1) of the function that was tabulated.
-    pub fn integral(&self) -> f64 {
-        self.integral
-    }
-
-    /// The number of bins: at least 1.
-    #[allow(clippy::len_without_is_empty)]
-    pub fn len(&self) -> usize {
-        self.density.len()
-    }
-
-    /// The point that `u` in [0, 1) maps to, its density, and its bin. A bin of density 0 is never returned.
-    #[inline]
-    pub fn sample(&self, u: f32) -> (f32, f32, usize) {
-        let (x, bin) = invert_cdf(&self.cdf, &self.index, u);
-        (x, self.density[bin], bin)
-    }
-
-    /// The density at `x`, 0 outside [0, 1).
-    #[inline]
-    pub fn pdf(&self, x: f32) -> f32 {
-        bin_of(x, self.density.len()).map_or(0.0, |bin| self.density[bin])
-    }
-
-    /// The `u` that [`Self::sample`] maps to `x`, up to rounding: the cumulative probability at `x`.
-    pub fn inverse(&self, x: f32) -> f32 {
-        cumulative(&self.cdf, x)
-    }
-}
+use crate::math::BELOW_ONE;
 
 /// A density over [0, 1)² that is constant in each of `width` × `height` equal cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseConstant2D {
-    /// Of y.
-    marginal: PiecewiseConstant1D,
-    /// Of x in each row: `width` + 1 values a row.
-    cdf: Box<[f32]>,
-    /// Where to look in each row.
-    index: Box<[u32]>,
-    /// Joint density, row by row.
-    density: Box<[f32]>,
+    /// Of the rows.
+    marginal: Cdf,
+    /// Of the cells in each row, row after row.
+    rows: Cdf,
     width: usize,
+}
+
+/// Cumulative distributions, one after the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Cdf {
+    /// Probability before bin i: for n bins n + 1 values from 0 to 1.
+    values: Vec<f32>,
+    /// Where to look in them: see [`push_index`].
+    index: Vec<u32>,
+}
+
+impl Cdf {
+    /// Appends the distribution proportional to `weights` and returns their sum.
+    fn push(&mut self, weights: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+        let first = self.values.len();
+        let sum = push_cdf(weights, &mut self.values);
+        push_index(&self.values[first..], &mut self.index);
+        sum
+    }
+
+    /// See [`invert`], for distribution `number` of those of as many bins.
+    #[inline]
+    fn invert(&self, bins: usize, number: usize, u: f32) -> (usize, f32) {
+        let stride = entries(bins) + 1;
+        invert(&self.values[number * (bins + 1)..][..bins + 1], &self.index[number * stride..][..stride], u)
+    }
 }
 
 impl PiecewiseConstant2D {
@@ -89,71 +52,22 @@ impl PiecewiseConstant2D {
             return None;
         }
         assert!(width > 0 && values.len() % width == 0, "{} values in rows of {width}", values.len());
-        let height = values.len() / width;
-        let mut cdf = Vec::with_capacity(height * (width + 1));
-        let sums: Vec<f64> =
-            values.chunks_exact(width).map(|row| push_cdf(row.iter().map(|&v| usable(v)), &mut cdf)).collect();
-        let mut index = Vec::with_capacity(height * (entries(width) + 1));
-        cdf.chunks_exact(width + 1).for_each(|row| push_index(row, &mut index));
-        let marginal = PiecewiseConstant1D::from_sums(sums.iter().copied())?;
-        let total: f64 = sums.iter().sum();
-        let scale = values.len() as f64 / total;
-        let density = values.iter().map(|&v| if total > 0.0 { (usable(v) * scale) as f32 } else { 1.0 }).collect();
-        Some(Self { marginal, cdf: cdf.into(), index: index.into(), density, width })
+        let (mut marginal, mut rows) = (Cdf::default(), Cdf::default());
+        rows.values.reserve_exact(values.len() + values.len() / width);
+        let sums: Vec<f64> = values.chunks_exact(width).map(|row| rows.push(row.iter().map(|&v| usable(v)))).collect();
+        marginal.push(sums.iter().copied());
+        Some(Self { marginal, rows, width })
     }
 
-    /// The integral over [0, 1)² of the function that was tabulated.
-    pub fn integral(&self) -> f64 {
-        self.marginal.integral / self.width as f64
-    }
-
-    /// Width and height of the table.
-    pub fn size(&self) -> [usize; 2] {
-        [self.width, self.marginal.len()]
-    }
-
-    /// The point that `u` in [0, 1)² maps to, its density, and its cell (x, y). A cell of density 0 is never returned.
+    /// The cell (x, y) that `u` in [0, 1)² falls into, and where in the cell, in [0, 1)². A cell of density 0 is never
+    /// returned.
     ///
     /// `u.y` selects the row, `u.x` the place in it; strata of `u` stay in one piece.
     #[inline]
-    pub fn sample(&self, u: Vec2) -> (Vec2, f32, [usize; 2]) {
-        let (y, row) = invert_cdf(&self.marginal.cdf, &self.marginal.index, u.y);
-        let (x, column) = invert_cdf(self.row_cdf(row), self.row_index(row), u.x);
-        (Vec2::new(x, y), self.density[row * self.width + column], [column, row])
-    }
-
-    /// The cell (x, y) in which [`Self::sample`] finds its point, and where in the cell, in [0, 1)².
-    #[inline]
     pub fn sample_cell(&self, u: Vec2) -> ([usize; 2], Vec2) {
-        let (row, y) = invert_to_bin(&self.marginal.cdf, &self.marginal.index, u.y);
-        let (column, x) = invert_to_bin(self.row_cdf(row), self.row_index(row), u.x);
+        let (row, y) = self.marginal.invert(self.marginal.values.len() - 1, 0, u.y);
+        let (column, x) = self.rows.invert(self.width, row, u.x);
         ([column, row], Vec2::new(x, y))
-    }
-
-    /// The density at `p`, 0 outside [0, 1)².
-    #[inline]
-    pub fn pdf(&self, p: Vec2) -> f32 {
-        match (bin_of(p.x, self.width), bin_of(p.y, self.marginal.len())) {
-            (Some(column), Some(row)) => self.density[row * self.width + column],
-            _ => 0.0,
-        }
-    }
-
-    /// The `u` that [`Self::sample`] maps to `p`, up to rounding.
-    pub fn inverse(&self, p: Vec2) -> Vec2 {
-        let row = bin_of(p.y.clamp(0.0, BELOW_ONE), self.marginal.len()).unwrap_or(0);
-        Vec2::new(cumulative(self.row_cdf(row), p.x), self.marginal.inverse(p.y))
-    }
-
-    #[inline]
-    fn row_index(&self, row: usize) -> &[u32] {
-        let stride = entries(self.width) + 1;
-        &self.index[row * stride..][..stride]
-    }
-
-    #[inline]
-    fn row_cdf(&self, row: usize) -> &[f32] {
-        &self.cdf[row * (self.width + 1)..][..self.width + 1]
     }
 }
 
@@ -178,9 +92,6 @@ fn push_index(cdf: &[f32], index: &mut Vec<u32>) {
     index.extend((0..=n).map(|k| inner.partition_point(|&c| c <= k as f32 / n as f32) as u32));
 }
 
-/// The largest `f32` below 1.
-const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
-
 fn usable(value: f32) -> f64 {
     if value > 0.0 && value.is_finite() { f64::from(value) } else { 0.0 }
 }
@@ -200,15 +111,9 @@ fn push_cdf(values: impl ExactSizeIterator<Item = f64> + Clone, cdf: &mut Vec<f3
     total
 }
 
-/// The bin of `x`, decided exactly: the product of an `f32` and a count below 2²⁹ has no rounding in `f64`.
-#[inline]
-fn bin_of(x: f32, bins: usize) -> Option<usize> {
-    (0.0..1.0).contains(&x).then(|| (f64::from(x) * bins as f64) as usize)
-}
-
 /// The bin in which the cumulative probability reaches `u`, and how far into it, in [0, 1).
 #[inline]
-fn invert_to_bin(cdf: &[f32], index: &[u32], u: f32) -> (usize, f32) {
+fn invert(cdf: &[f32], index: &[u32], u: f32) -> (usize, f32) {
     let u = u.clamp(0.0, BELOW_ONE);
     // The last bin that starts at or before u: it cannot be empty, since the next one starts after u.
     let entry = (u * (index.len() - 1) as f32) as usize;
@@ -216,34 +121,6 @@ fn invert_to_bin(cdf: &[f32], index: &[u32], u: f32) -> (usize, f32) {
     let bin = first + cdf[first + 1..=last].partition_point(|&c| c <= u);
     let (low, high) = (cdf[bin], cdf[bin + 1]);
     (bin, ((u - low) / (high - low)).min(BELOW_ONE))
-}
-
-/// The `x` whose cumulative probability is `u`, and its bin.
-#[inline]
-fn invert_cdf(cdf: &[f32], index: &[u32], u: f32) -> (f32, usize) {
-    let bins = cdf.len() - 1;
-    let (bin, within) = invert_to_bin(cdf, index, u);
-    let x = ((bin as f64 + f64::from(within)) / bins as f64) as f32;
-    // Rounding can leave the bin by an ulp at either end; there the density would be another. x is not negative, so the
-    // neighbouring floats have neighbouring bits.
-    let x = x.min(BELOW_ONE);
-    match bin_of(x, bins) {
-        Some(found) if found > bin => (f32::from_bits(x.to_bits() - 1), bin),
-        Some(found) if found < bin => (f32::from_bits(x.to_bits() + 1), bin),
-        _ => (x, bin),
-    }
-}
-
-fn cumulative(cdf: &[f32], x: f32) -> f32 {
-    let bins = cdf.len() - 1;
-    match bin_of(x, bins) {
-        Some(bin) => {
-            let within = (f64::from(x) * bins as f64 - bin as f64) as f32;
-            cdf[bin] + (cdf[bin + 1] - cdf[bin]) * within
-        }
-        None if x >= 1.0 => 1.0,
-        None => 0.0,
-    }
 }
 
 #[cfg(test)]

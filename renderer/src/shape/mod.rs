@@ -24,7 +24,7 @@ pub use patch::Patch;
 pub use sphere::Sphere;
 pub use triangle::Triangle;
 
-use crate::math::PointWithError;
+use crate::math::{PointWithError, next_away_from_zero, next_towards_zero};
 
 /// A shape in world space, small enough to keep one per emitting triangle.
 #[derive(Clone, Debug, PartialEq)]
@@ -171,14 +171,7 @@ fn round_up(x: f64) -> f32 {
     if f64::from(rounded) >= x {
         return rounded;
     }
-    // The bits of a float count its magnitude. (`f32::next_up` is younger than our compiler.)
-    if rounded == 0.0 {
-        f32::from_bits(1)
-    } else if rounded > 0.0 {
-        f32::from_bits(rounded.to_bits() + 1)
-    } else {
-        f32::from_bits(rounded.to_bits() - 1)
-    }
+    if rounded >= 0.0 { next_away_from_zero(rounded) } else { next_towards_zero(rounded) }
 }
 
 /// The greatest `f32` not above `x`.

@@ -17,36 +17,19 @@ pub struct RgbImage {
     pub pixels: Vec<Rgb>,
 }
 
-impl RgbImage {
-    /// The pixel in column `x` of row `y`, counted from the top.
-    pub fn pixel(&self, x: usize, y: usize) -> Rgb {
-        self.pixels[y * self.width + x]
-    }
-}
-
-/// Loads an image for a light: integers are sRGB, floats are linear; grey images have equal channels.
+/// Loads an image for a light: integers are sRGB, floats are linear; grey images have equal channels. Also how many values
+/// were not finite and became 0.
 ///
 /// # Errors
 /// The file cannot be read, or has no R, G and B among several channels; the message names the file.
-pub fn load_rgb(path: impl AsRef<Path>) -> Result<RgbImage, String> {
-    load_rgb_encoded(path, None)
-}
-
-/// As [`load_rgb`], but integers are encoded as given: a normal map is [`Encoding::Linear`].
-///
-/// # Errors
-/// As [`load_rgb`].
-pub fn load_rgb_encoded(path: impl AsRef<Path>, encoding: Option<Encoding>) -> Result<RgbImage, String> {
-    let texels = load_texels(path.as_ref(), Channels::Rgb, encoding)?;
-    let table = texels.encoding.table();
-    let rgb = |i: usize| match (&texels.data, texels.channels) {
-        (TexelData::U8(bytes), 1) => Rgb::splat(table[usize::from(bytes[i])]),
-        (TexelData::U8(bytes), _) => Rgb::from_array(std::array::from_fn(|c| table[usize::from(bytes[3 * i + c])])),
-        (_, 1) => Rgb::splat(texels.value(i)),
+pub fn load_rgb(path: &Path) -> Result<(RgbImage, usize), String> {
+    let texels = load_texels(path, Channels::Rgb, None)?;
+    let rgb = |i: usize| match texels.channels {
+        1 => Rgb::splat(texels.value(i)),
         _ => Rgb::from_array(std::array::from_fn(|c| texels.value(3 * i + c))),
     };
     let pixels = (0..texels.width * texels.height).map(rgb).collect();
-    Ok(RgbImage { width: texels.width, height: texels.height, pixels })
+    Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.replaced))
 }
 
 /// Which channels of a file are meant.
@@ -243,17 +226,21 @@ pub(super) mod tests {
         let linear = Rgb::new(0.215_860_5, 0.0, 1.0);
         let png = folder.path().join("a.png");
         write(&png, [1, 1], &RGB8, &pixels);
-        assert!((load_rgb(&png).unwrap().pixel(0, 0) - linear).length() < 1e-6);
-        let stored = load_rgb_encoded(&png, Some(Encoding::Linear)).unwrap().pixel(0, 0);
+        assert!((load_rgb(&png).unwrap().0.pixels[0] - linear).length() < 1e-6);
+        let rgb = |path: &Path, encoding| {
+            let texels = load_texels(path, Channels::Rgb, Some(encoding)).unwrap();
+            Rgb::from_array([0, 1, 2].map(|c| texels.value(c)))
+        };
+        let stored = rgb(&png, Encoding::Linear);
         assert!((stored - Rgb::from_array(pixels)).length() < 1e-6);
 
         write(&png, [1, 1], &RGB16, &pixels);
         // 16 bits place the value to 1/65535.
-        assert!((load_rgb(&png).unwrap().pixel(0, 0) - linear).length() < 1e-4);
+        assert!((load_rgb(&png).unwrap().0.pixels[0] - linear).length() < 1e-4);
 
         let exr = folder.path().join("a.exr");
         write(&exr, [1, 1], &[("B", Format::Float), ("G", Format::Float), ("R", Format::Float)], &[3.0, 2.0, 1.0]);
-        assert_eq!(load_rgb_encoded(&exr, Some(Encoding::Srgb)).unwrap().pixel(0, 0), Rgb::new(1.0, 2.0, 3.0));
+        assert_eq!(rgb(&exr, Encoding::Srgb), Rgb::new(1.0, 2.0, 3.0));
     }
 
     #[test]
@@ -280,7 +267,7 @@ pub(super) mod tests {
 
     #[test]
     fn errors_name_the_file_and_what_it_lacks() {
-        let error = load_rgb("no-such.png").unwrap_err();
+        let error = load_rgb(Path::new("no-such.png")).unwrap_err();
         assert!(error.contains("no-such.png"), "{error}");
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("xyz.exr");

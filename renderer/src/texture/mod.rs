@@ -23,7 +23,7 @@ use std::sync::Arc;
 use glam::{Affine3A, Vec2, Vec3};
 
 pub use build::TextureError;
-pub use image::{RgbImage, load_rgb, load_rgb_encoded};
+pub use image::RgbImage;
 pub use pyramid::Pyramid;
 
 use crate::math::Rgb;
