@@ -18,7 +18,7 @@ use crate::scene::Span;
 use crate::scene::description::{self, AreaLightId, Value};
 use crate::shape::Shape;
 use crate::texture::RgbImage;
-use crate::texture::image::load_rgb;
+use crate::texture::image::{Flaws, UNKNOWN_SPACE, load_rgb};
 
 /// A message and the place in the scene file that it is about.
 pub type Message = (Span, String);
@@ -82,8 +82,8 @@ impl Lights {
     }
 }
 
-/// An image, and how many of its values were not finite and became 0; or why there is none.
-pub(super) type Loaded = Result<(RgbImage, usize), String>;
+/// An image and what was mended of it, or why there is none.
+pub(super) type Loaded = Result<(RgbImage, Flaws), String>;
 
 /// The names of all groups, sorted.
 fn groups(lights: &[description::Light], area: &[description::AreaLight]) -> Vec<Arc<str>> {
@@ -117,13 +117,16 @@ impl<Load: Fn(&Path) -> Loaded> Compiler<Load> {
         if let Some(known) = self.images.get(path) {
             return known.clone();
         }
-        let loaded = (self.load)(path).and_then(|(image, replaced)| {
+        let loaded = (self.load)(path).and_then(|(image, flaws)| {
             let (image, unusable) =
                 LightImage::new(image).ok_or_else(|| format!("\"{}\" has no pixels", path.display()))?;
-            Ok((image, replaced + unusable))
+            Ok((image, flaws.replaced + unusable, flaws.unknown_space))
         });
         let image = match loaded {
-            Ok((image, unusable)) => {
+            Ok((image, unusable, unknown_space)) => {
+                if unknown_space {
+                    self.warnings.push((span, format!("\"{}\" {UNKNOWN_SPACE}", path.display())));
+                }
                 if unusable > 0 {
                     let what = "values are negative, infinite or not a number, and count as 0";
                     self.warnings.push((span, format!("\"{}\": {unusable} {what}", path.display())));

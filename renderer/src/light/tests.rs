@@ -11,6 +11,7 @@ use crate::scene::Span;
 use crate::scene::description::{self, AreaLight, AreaLightId, LightKind};
 use crate::shape::{Disk, Shape, Sphere, Triangle};
 use crate::texture::RgbImage;
+use crate::texture::image::Flaws;
 
 const BOUNDS: (Vec3, Vec3) = (Vec3::splat(-5.0), Vec3::splat(5.0));
 
@@ -35,7 +36,7 @@ fn area_light(radiance: Rgb) -> AreaLight {
 fn load(path: &Path) -> compile::Loaded {
     let square = |size: usize, texel: &dyn Fn(usize, usize) -> Rgb| {
         let pixels = (0..size * size).map(|i| texel(i % size, i / size)).collect();
-        Ok((RgbImage { width: size, height: size, pixels }, 0))
+        Ok((RgbImage { width: size, height: size, pixels }, Flaws::default()))
     };
     match path.to_str().unwrap() {
         "sky" => square(16, &|x, y| match (x, y) {
@@ -45,7 +46,7 @@ fn load(path: &Path) -> compile::Loaded {
         "black" => square(4, &|_, _| Rgb::ZERO),
         "bad" => square(2, &|x, y| [Rgb::ONE, Rgb::NAN, Rgb::NEG_X, Rgb::ONE][2 * y + x]),
         "poster" => square(2, &|x, y| Rgb::new(1.0 + x as f32, 1.0 + y as f32, 1.0)),
-        "wide" => Ok((RgbImage { width: 2, height: 1, pixels: vec![Rgb::ONE; 2] }, 0)),
+        "wide" => Ok((RgbImage { width: 2, height: 1, pixels: vec![Rgb::ONE; 2] }, Flaws::default())),
         _ => Err(format!("\"{}\": no such file", path.display())),
     }
 }

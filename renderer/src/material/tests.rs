@@ -105,7 +105,16 @@ fn a_ramp_of_displacement_tilts_the_normal_by_its_slope() {
 fn map(rgb: [f32; 3]) -> Pyramid {
     let data = TexelData::Float(rgb.to_vec());
     let encoding = description::Encoding::Linear;
-    Pyramid::new(Texels { width: 1, height: 1, channels: 3, data, encoding, alpha: false, replaced: 0 })
+    Pyramid::new(Texels {
+        width: 1,
+        height: 1,
+        channels: 3,
+        data,
+        encoding,
+        alpha: false,
+        space: Default::default(),
+        flaws: Default::default(),
+    })
 }
 
 #[test]

@@ -32,6 +32,18 @@ pub enum RgbSpace {
 }
 
 impl RgbSpace {
+    const ALL: [Self; 4] = [Self::Srgb, Self::DciP3, Self::Rec2020, Self::Aces2065];
+
+    /// The space with these [`Self::chromaticities`], of red, green, blue and white in turn, to three decimals: files state
+    /// them with four.
+    pub fn with_chromaticities(xy: &[f32]) -> Option<Self> {
+        let alike = |space: &Self| {
+            let own = space.chromaticities();
+            xy.len() == 8 && own.as_flattened().iter().zip(xy).all(|(a, b)| (a - b).abs() < 1e-3)
+        };
+        Self::ALL.into_iter().find(alike)
+    }
+
     /// The space of this name in pbrt-v4, in any case: `srgb`, `dci-p3`, `rec2020`, `aces2065-1`.
     pub fn named(name: &str) -> Option<Self> {
         match name.to_ascii_lowercase().as_str() {
@@ -139,11 +151,9 @@ mod tests {
     use super::*;
     use crate::math::Rgb;
 
-    const ALL: [RgbSpace; 4] = [RgbSpace::Srgb, RgbSpace::DciP3, RgbSpace::Rec2020, RgbSpace::Aces2065];
-
     #[test]
     fn names_are_those_of_scene_files() {
-        for (name, space) in ["sRGB", "dci-p3", "REC2020", "aces2065-1"].into_iter().zip(ALL) {
+        for (name, space) in ["sRGB", "dci-p3", "REC2020", "aces2065-1"].into_iter().zip(RgbSpace::ALL) {
             assert_eq!(RgbSpace::named(name), Some(space));
         }
         assert_eq!(RgbSpace::named("adobe"), None);
@@ -179,7 +189,7 @@ mod tests {
 
     #[test]
     fn white_stays_white_where_it_should() {
-        for space in ALL {
+        for space in RgbSpace::ALL {
             assert!((space.rec709_from_reflectance() * Rgb::ONE - 1.0).abs().max_element() < 1e-6);
             let there_and_back = space.film_from_rec709(None) * space.rec709_from_light();
             assert!((there_and_back - Mat3::IDENTITY).to_cols_array().iter().all(|d| d.abs() < 1e-5));
@@ -194,7 +204,7 @@ mod tests {
     #[test]
     fn white_balance_makes_its_daylight_white() {
         for kelvin in [3200.0, 5000.0, 6500.0, 9000.0] {
-            for space in ALL {
+            for space in RgbSpace::ALL {
                 let light = illuminant::daylight(kelvin).illuminant_rgb();
                 let film = space.film_from_rec709(Some(kelvin)) * light;
                 assert!((film / film.y - 1.0).abs().max_element() < 1e-5, "{space:?} {kelvin} K: {film}");
@@ -216,5 +226,11 @@ mod tests {
         let [r, _, _, white] = RgbSpace::Aces2065.chromaticities();
         assert_eq!(r, [0.7347, 0.2653]);
         assert!((white[0] - 0.32168).abs() < 5e-5 && (white[1] - 0.33767).abs() < 5e-5);
+        for space in RgbSpace::ALL {
+            assert_eq!(RgbSpace::with_chromaticities(space.chromaticities().as_flattened()), Some(space));
+        }
+        // P3 with the white of cinemas, and no chromaticities at all.
+        assert_eq!(RgbSpace::with_chromaticities(&[0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.314, 0.351]), None);
+        assert_eq!(RgbSpace::with_chromaticities(&[]), None);
     }
 }

@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::image::{Channels, load_texels};
+use super::image::{Channels, Flaws, UNKNOWN_SPACE, load_texels};
 use super::mapping::{Map, Map2, affine};
 use super::{ImageNode, Node, Pyramid, Textures};
 use crate::math::Rgb;
 use crate::scene::Span;
 use crate::scene::description::{Encoding, ImageTexture, Texture, TextureId, TextureKind, Value, Wrap};
+use crate::spectrum::RgbSpace;
 
 /// Look-ups that one look-up of a texture may lead to. Textures that name others twice over and over would otherwise
 /// multiply without end.
@@ -54,10 +55,10 @@ type Key = (PathBuf, u8, u32);
 /// The images that one file was loaded as.
 struct File {
     rgb: Arc<Pyramid>,
-    /// The same as `rgb`, unless the file has an alpha channel that says something.
+    /// The same as `rgb`, unless the file has an alpha channel that says something or is of another RGB space.
     number: Arc<Pyramid>,
     /// How many values were not finite.
-    replaced: usize,
+    flaws: Flaws,
 }
 
 fn key(image: &ImageTexture) -> Key {
@@ -85,12 +86,15 @@ fn load_images(textures: &[Texture]) -> BTreeMap<Key, Result<File, String>> {
 
 fn load(image: &ImageTexture, rgb: bool, number: bool) -> Result<File, String> {
     let read = |channels| load_texels(&image.path, channels, image.encoding);
-    let first = read(if number { Channels::Number } else { Channels::Rgb })?;
-    let second = if number && rgb && first.alpha { Some(read(Channels::Rgb)?) } else { None };
-    let replaced = first.replaced + second.as_ref().map_or(0, |texels| texels.replaced);
+    let first = read(if number { Channels::Number } else { Channels::Reflectance })?;
+    // A number is the mean of channels as they are.
+    let other = first.alpha || first.space != RgbSpace::Srgb;
+    let second = if number && rgb && other { Some(read(Channels::Reflectance)?) } else { None };
+    let replaced = first.flaws.replaced + second.as_ref().map_or(0, |texels| texels.flaws.replaced);
+    let unknown_space = first.flaws.unknown_space;
     let first = Arc::new(Pyramid::new(first));
     let second = second.map_or_else(|| Arc::clone(&first), |texels| Arc::new(Pyramid::new(texels)));
-    Ok(File { rgb: second, number: first, replaced })
+    Ok(File { rgb: second, number: first, flaws: Flaws { replaced, unknown_space } })
 }
 
 /// How much work a look-up may be: itself and those it leads to.
@@ -214,13 +218,15 @@ impl Builder<'_> {
 
     fn image(&mut self, texture: &Texture, image: &ImageTexture) -> Result<Node, String> {
         let file = self.images[&key(image)].as_ref().map_err(Clone::clone)?;
-        if file.replaced > 0 {
-            let message = format!(
-                "texture \"{}\": {} values of \"{}\" are not finite and were taken as 0",
-                texture.name,
-                file.replaced,
-                image.path.display()
-            );
+        let (name, path) = (&texture.name, image.path.display());
+        if file.flaws.unknown_space && !image.monochrome {
+            let message = format!("texture \"{name}\": \"{path}\" {UNKNOWN_SPACE}");
+            self.warnings.push(TextureError { span: texture.span, message });
+        }
+        if file.flaws.replaced > 0 {
+            let count = file.flaws.replaced;
+            let message =
+                format!("texture \"{name}\": {count} values of \"{path}\" are not finite and were taken as 0");
             self.warnings.push(TextureError { span: texture.span, message });
         }
         let pyramid = Arc::clone(if image.monochrome { &file.number } else { &file.rgb });

@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
+use glam::{DVec3, Mat3, Vec3};
+
 use super::encoding::{f32_to_half, half_to_f32};
 use crate::math::Rgb;
 use crate::scene::description::Encoding;
+use crate::spectrum::RgbSpace;
 
 /// An image in linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,26 +20,41 @@ pub struct RgbImage {
     pub pixels: Vec<Rgb>,
 }
 
-/// Loads an image for a light: integers are sRGB, floats are linear; grey images have equal channels. Also how many values
-/// were not finite and became 0.
+/// What of a file was not as it should be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flaws {
+    /// How many values were not finite and became 0.
+    pub replaced: usize,
+    /// It names an RGB space that is not known, and was read as if it named none.
+    pub unknown_space: bool,
+}
+
+/// What to say of a file whose RGB space is not known.
+pub const UNKNOWN_SPACE: &str = "has chromaticities of no RGB space that is known, and is read as Rec.709";
+
+/// Loads an image for a light: integers are sRGB, floats linear RGB of the space that the file names, Rec.709 if none; grey
+/// images have equal channels.
 ///
 /// # Errors
 /// The file cannot be read, or has no R, G and B among several channels; the message names the file.
-pub fn load_rgb(path: &Path) -> Result<(RgbImage, usize), String> {
+pub fn load_rgb(path: &Path) -> Result<(RgbImage, Flaws), String> {
     let texels = load_texels(path, Channels::Rgb, None)?;
+    let rec709 = texels.space.rec709_from_light();
     let rgb = |i: usize| match texels.channels {
         1 => Rgb::splat(texels.value(i)),
         _ => Rgb::from_array(std::array::from_fn(|c| texels.value(3 * i + c))),
     };
-    let pixels = (0..texels.width * texels.height).map(rgb).collect();
-    Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.replaced))
+    let pixels = (0..texels.width * texels.height).map(|i| rec709 * rgb(i)).collect();
+    Ok((RgbImage { width: texels.width, height: texels.height, pixels }, texels.flaws))
 }
 
 /// Which channels of a file are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Channels {
-    /// R, G and B, or the only one.
+    /// R, G and B, or the only one, as they are.
     Rgb,
+    /// The same as reflectances in Rec.709.
+    Reflectance,
     /// For a number: the alpha channel if it says anything, else as `Rgb`, whose mean is taken.
     Number,
 }
@@ -67,8 +85,30 @@ pub struct Texels {
     pub encoding: Encoding,
     /// It is the file's alpha channel.
     pub alpha: bool,
-    /// How many values were not finite and became 0.
-    pub replaced: usize,
+    /// That of the values.
+    pub space: RgbSpace,
+    /// What was mended.
+    pub flaws: Flaws,
+}
+
+impl TexelData {
+    /// Multiplies texels of three channels by a matrix. Bytes stay as they are.
+    fn multiply(&mut self, matrix: Mat3) {
+        fn each<T: Copy>(items: &mut [T], change: impl Fn([T; 3]) -> [T; 3]) {
+            items.chunks_exact_mut(3).for_each(|rgb| rgb.copy_from_slice(&change([rgb[0], rgb[1], rgb[2]])));
+        }
+        // Terms may overflow, and their sum must not be NaN.
+        let matrix = matrix.as_dmat3();
+        let product = |rgb: [f32; 3]| {
+            let exact = matrix * Vec3::from_array(rgb).as_dvec3();
+            exact.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3().to_array()
+        };
+        match self {
+            Self::U8(_) => {}
+            Self::Half(halves) => each(halves, |rgb| product(rgb.map(half_to_f32)).map(f32_to_half)),
+            Self::Float(floats) => each(floats, product),
+        }
+    }
 }
 
 impl Texels {
@@ -84,7 +124,8 @@ impl Texels {
 
 /// Loads an image in the format of its file.
 ///
-/// `encoding` is that of integers; without it they are sRGB, an alpha channel linear. Floats are always linear.
+/// `encoding` is that of integers; without it they are sRGB, an alpha channel linear. Floats are always linear, in the space
+/// whose `chromaticities` their file has.
 ///
 /// # Errors
 /// As [`load_rgb`].
@@ -100,8 +141,10 @@ pub fn load_texels(path: &Path, channels: Channels, encoding: Option<Encoding>) 
     let window = reader.data_window();
     let pick = Pick { stride: names.len(), chosen };
     let (width, height) = (window.width, window.height);
-    let mut replaced = 0;
-    let (data, channels) = match stored {
+    let space = if stored.is_linear() { space_of(&reader) } else { Some(RgbSpace::Srgb) };
+    let mut flaws = Flaws { replaced: 0, unknown_space: space.is_none() };
+    let mut space = space.unwrap_or_default();
+    let (mut data, kept) = match stored {
         Stored::U8(bytes) => {
             let (bytes, channels) = pick.collapse(bytes);
             (TexelData::U8(bytes), channels)
@@ -109,7 +152,7 @@ pub fn load_texels(path: &Path, channels: Channels, encoding: Option<Encoding>) 
         Stored::Half(halves) => {
             let (mut halves, channels) = pick.collapse(halves);
             let broken = halves.iter_mut().filter(|bits| **bits & 0x7c00 == 0x7c00);
-            replaced = broken.map(|bits| *bits = 0).count();
+            flaws.replaced = broken.map(|bits| *bits = 0).count();
             (TexelData::Half(halves), channels)
         }
         Stored::Float(floats, integers) => {
@@ -118,11 +161,28 @@ pub fn load_texels(path: &Path, channels: Channels, encoding: Option<Encoding>) 
                 floats.iter_mut().for_each(|value| *value = integers_are.decode(*value));
             }
             let broken = floats.iter_mut().filter(|value| !value.is_finite());
-            replaced = broken.map(|value| *value = 0.0).count();
+            flaws.replaced = broken.map(|value| *value = 0.0).count();
             (TexelData::Float(floats), channels)
         }
     };
-    Ok(Texels { width, height, channels, data, encoding: integers_are, alpha: masked.is_some(), replaced })
+    if channels == Channels::Reflectance {
+        // Grey stays grey.
+        if kept == 3 && space != RgbSpace::Srgb {
+            data.multiply(space.rec709_from_reflectance());
+        }
+        space = RgbSpace::Srgb;
+    }
+    Ok(Texels { width, height, channels: kept, data, encoding: integers_are, alpha: masked.is_some(), space, flaws })
+}
+
+/// The space of the file's `chromaticities`: Rec.709 if it has none, `None` if they are of no space that is known.
+fn space_of(reader: &oiio::Reader) -> Option<RgbSpace> {
+    let attributes = reader.attributes();
+    let named = attributes.iter().find(|(name, _)| name.eq_ignore_ascii_case("chromaticities"));
+    match named {
+        Some((_, oiio::Attribute::Floats(xy))) => RgbSpace::with_chromaticities(xy),
+        _ => Some(RgbSpace::default()),
+    }
 }
 
 /// Where the wanted channels are among those of the file.
@@ -156,6 +216,11 @@ impl Stored {
             oiio::Format::U16 => Self::Float(reader.read_f32()?, true),
             oiio::Format::Float => Self::Float(reader.read_f32()?, false),
         })
+    }
+
+    /// Whether these are no integers.
+    fn is_linear(&self) -> bool {
+        matches!(self, Self::Half(_) | Self::Float(_, false))
     }
 
     /// Whether the channel is 1 everywhere.
@@ -196,10 +261,20 @@ impl Pick {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use oiio::{Channel, FileFormat, Format, Output, Window};
+    use oiio::{Attribute, Channel, FileFormat, Format, Output, Window};
 
     /// Writes an image with the given channels; `.png` by name, else EXR.
     pub fn write(path: &Path, size: [usize; 2], channels: &[(&str, Format)], pixels: &[f32]) {
+        write_with(path, size, channels, pixels, vec![]);
+    }
+
+    fn write_with(
+        path: &Path,
+        size: [usize; 2],
+        channels: &[(&str, Format)],
+        pixels: &[f32],
+        attributes: Vec<(String, Attribute)>,
+    ) {
         let window = Window::at_origin(size[0], size[1]);
         let png = path.extension().is_some_and(|e| e == "png");
         oiio::write(&Output {
@@ -209,7 +284,7 @@ pub(super) mod tests {
             display_window: window,
             channels: channels.iter().map(|&(name, format)| Channel { name: name.to_owned(), format }).collect(),
             pixels,
-            attributes: vec![],
+            attributes,
             compression: oiio::Compression::default(),
         })
         .unwrap();
@@ -244,6 +319,41 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn floats_are_of_the_space_that_their_file_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let stored = Rgb::new(0.25, 0.75, 0.5);
+        let of = |format: Format, rgb: Rgb, xy: &[f32]| {
+            let attributes = vec![("chromaticities".to_owned(), Attribute::Floats(xy.to_vec()))];
+            write_with(&path, [1, 1], &["R", "G", "B"].map(|name| (name, format)), &rgb.to_array(), attributes);
+            let texels = |channels| load_texels(&path, channels, None).unwrap();
+            let value = |t: &Texels| Rgb::from_array([0, 1, 2].map(|c| t.value(if t.channels == 3 { c } else { 0 })));
+            let (light, flaws) = load_rgb(&path).unwrap();
+            let data =
+                [Channels::Rgb, Channels::Reflectance, Channels::Number].map(|channels| value(&texels(channels)));
+            (light.pixels[0], data, flaws.unknown_space)
+        };
+        for space in [RgbSpace::Srgb, RgbSpace::DciP3, RgbSpace::Rec2020, RgbSpace::Aces2065] {
+            let xy = space.chromaticities();
+            // A half has eleven digits; sums of three terms of up to 2 err by half an ulp of each in f32.
+            for (format, error) in [(Format::Float, 0.0), (Format::Half, 2.0_f32.powi(-11))] {
+                let (light, [data, reflectance, number], unknown) = of(format, stored, xy.as_flattened());
+                assert_eq!((light, data, number, unknown), (space.rec709_from_light() * stored, stored, stored, false));
+                let expected = space.rec709_from_reflectance() * stored;
+                assert!(
+                    (reflectance - expected).abs().cmple(expected.abs() * error + 4.0 * f32::EPSILON).all(),
+                    "{space:?}"
+                );
+            }
+            // What is grey is white light of the space, and reflects all light alike.
+            let (light, [_, reflectance, _], _) = of(Format::Float, Rgb::splat(0.5), xy.as_flattened());
+            assert_eq!((light, reflectance), (space.rec709_from_light() * Rgb::splat(0.5), Rgb::splat(0.5)));
+        }
+        let strange = [0.7, 0.3, 0.2, 0.7, 0.15, 0.05, 0.314, 0.351];
+        assert_eq!(of(Format::Float, stored, &strange), (stored, [stored; 3], true));
+    }
+
+    #[test]
     fn grey_collapses_alpha_is_a_number_and_broken_values_are_counted() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grey.png");
@@ -257,7 +367,7 @@ pub(super) mod tests {
         let mask = load_texels(&path, Channels::Number, None).unwrap();
         assert_eq!((mask.channels, mask.value(0), mask.value(1)), (1, 1.0, 0.25));
         let rgb = load_texels(&path, Channels::Rgb, None).unwrap();
-        assert_eq!((rgb.channels, rgb.value(2), rgb.value(3), rgb.value(4), rgb.replaced), (3, 3.0, 4.0, 0.0, 2));
+        assert_eq!((rgb.channels, rgb.value(2), rgb.value(3), rgb.value(4), rgb.flaws.replaced), (3, 3.0, 4.0, 0.0, 2));
 
         let path = folder.path().join("opaque.png");
         let rgba = [RGB8[0], RGB8[1], RGB8[2], ("A", Format::U8)];

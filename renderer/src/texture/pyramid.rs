@@ -341,7 +341,8 @@ mod tests {
     const WRAPS: [Wrap; 4] = [Wrap::Repeat, Wrap::Black, Wrap::Clamp, Wrap::OctahedralSphere];
 
     fn texels(width: usize, height: usize, channels: usize, data: TexelData) -> Texels {
-        Texels { width, height, channels, data, encoding: Encoding::Srgb, alpha: false, replaced: 0 }
+        let (space, flaws) = Default::default();
+        Texels { width, height, channels, data, encoding: Encoding::Srgb, alpha: false, space, flaws }
     }
 
     fn floats(width: usize, height: usize, value: impl Fn(usize, usize) -> f32) -> Pyramid {
