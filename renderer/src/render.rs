@@ -304,13 +304,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     let mut statistics = Statistics { threads: rayon::current_num_threads(), ..Statistics::default() };
     // Images are read by our own threads, one each: OpenImageIO's pool would only contend with them.
     oiio::set_threads(1)?;
-    observer.phase(Phase::Parse);
-    let start = Instant::now();
-    let (mut description, warnings) =
-        scene::pbrt::load_mapped(&job.scene, &job.path_map).map_err(RenderError::Scene)?;
-    warnings.iter().for_each(|warning| observer.warning(warning));
-    apply(job, &mut description);
-    statistics.parse_seconds = start.elapsed().as_secs_f64();
+    let mut description = described(job, &mut statistics, observer)?;
 
     let seed = job.seed.unwrap_or(description.seed);
     let seed = if job.lock_seed { seed } else { job.frame.map_or(seed, |frame| seed_of_frame(seed, frame)) };
@@ -318,33 +312,10 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
     let spp = job.sample_range.as_ref().map_or(spp, |range| spp.max(range.end));
     job.filtering.validate()?;
     let filtering = job.filtering.settled(spp);
-    let asked = match job.slice {
-        Some(slice) => slice.samples(spp, filtering.slice_unit())?,
-        None => job.sample_range.clone().unwrap_or(0..spp),
-    };
-    if asked.is_empty() {
-        return Err(RenderError::EmptySampleRange(asked));
-    }
-    let asked = match asked.end - asked.start {
-        ..=film::MOST_TERMS => asked,
-        // As many as time allows, which is not so many.
-        _ if job.time_limit.is_some() => asked.start..asked.start + film::MOST_TERMS,
-        count => return Err(RenderError::TooManySamples(count)),
-    };
+    let asked = samples(job, spp, &filtering)?;
     let aovs = if description.film.gbuffer { job.aovs.union(AovSet::gbuffer()) } else { job.aovs };
 
-    observer.phase(Phase::Compile);
-    let start = Instant::now();
-    let device = embree::Device::new(&embree::DeviceOptions::default())?;
-    let (world, warnings) =
-        compile::origin::world(&mut description, &device, job.techniques).map_err(|errors| match errors {
-            CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
-            CompileError::Embree(error) => RenderError::Embree(error),
-        })?;
-    warnings.iter().for_each(|warning| observer.warning(warning));
-    statistics.compile_seconds = start.elapsed().as_secs_f64();
-    statistics.embree_bytes = device.memory().peak;
-    (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
+    let (world, device) = built(job, &mut description, &mut statistics, observer)?;
 
     let mattes = [film::Aov::CryptoObject, film::Aov::CryptoMaterial].map(|aov| aovs.contains(aov));
     let names = mattes.contains(&true).then(|| Names::new(&description, &world.geometry));
@@ -385,6 +356,61 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         };
     }
     Ok(Prepared { world, description, statistics, device, ids })
+}
+
+/// The scene as its files and the job describe it.
+fn described(
+    job: &Job,
+    statistics: &mut Statistics,
+    observer: &dyn Observer,
+) -> Result<scene::description::Scene, RenderError> {
+    observer.phase(Phase::Parse);
+    let start = Instant::now();
+    let (mut description, warnings) =
+        scene::pbrt::load_mapped(&job.scene, &job.path_map).map_err(RenderError::Scene)?;
+    warnings.iter().for_each(|warning| observer.warning(warning));
+    apply(job, &mut description);
+    statistics.parse_seconds = start.elapsed().as_secs_f64();
+    Ok(description)
+}
+
+/// The samples that a job asks of a frame of `spp`.
+fn samples(job: &Job, spp: u64, filtering: &Filtering) -> Result<Range<u64>, RenderError> {
+    let asked = match job.slice {
+        Some(slice) => slice.samples(spp, filtering.slice_unit())?,
+        None => job.sample_range.clone().unwrap_or(0..spp),
+    };
+    if asked.is_empty() {
+        return Err(RenderError::EmptySampleRange(asked));
+    }
+    match asked.end - asked.start {
+        ..=film::MOST_TERMS => Ok(asked),
+        // As many as time allows, which is not so many.
+        _ if job.time_limit.is_some() => Ok(asked.start..asked.start + film::MOST_TERMS),
+        count => Err(RenderError::TooManySamples(count)),
+    }
+}
+
+/// The world of a description, and the device that its geometry lives on.
+fn built(
+    job: &Job,
+    description: &mut scene::description::Scene,
+    statistics: &mut Statistics,
+    observer: &dyn Observer,
+) -> Result<(World, embree::Device), RenderError> {
+    observer.phase(Phase::Compile);
+    let start = Instant::now();
+    let device = embree::Device::new(&embree::DeviceOptions::default())?;
+    let (world, warnings) =
+        compile::origin::world(description, &device, job.techniques).map_err(|errors| match errors {
+            CompileError::Scene(diagnostics) => RenderError::Compile(diagnostics),
+            CompileError::Embree(error) => RenderError::Embree(error),
+        })?;
+    warnings.iter().for_each(|warning| observer.warning(warning));
+    statistics.compile_seconds = start.elapsed().as_secs_f64();
+    statistics.embree_bytes = device.memory().peak;
+    (statistics.primitives, statistics.unique_primitives) = world.geometry.primitive_counts();
+    Ok((world, device))
 }
 
 /// The ids of names.
