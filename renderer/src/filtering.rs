@@ -125,6 +125,16 @@ pub struct Surroundings {
     pub response: Mat3,
 }
 
+impl std::fmt::Display for Surroundings {
+    /// What cells depend on, in words: of lengths and radiance the power of two counts.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Anchor { origin, extent } = self.anchor;
+        let [x, y, z] = origin.to_array();
+        let (size, unit) = (extent.log2().floor(), self.unit.log2().floor());
+        write!(f, "from {x} {y} {z}, of size 2^{size}, in units of 2^{unit}")
+    }
+}
+
 /// A frame's filter.
 pub struct FrameFilter {
     sharing: Sharing,

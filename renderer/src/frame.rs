@@ -58,6 +58,10 @@ impl FrameDescription {
     pub fn settings(&self) -> Vec<(&'static str, String)> {
         let ([x0, x1], [y0, y1]) = (self.in_frame(0), self.in_frame(1));
         let filter = self.filtering.settings().into_iter().map(|(key, value)| format!(" {key}={value}"));
+        let cells = match self.filtering {
+            Filtering::None => "none".to_owned(),
+            _ => self.surroundings.to_string(),
+        };
         vec![
             ("version", env!("CARGO_PKG_VERSION").into()),
             ("scene", format!("{:016x}", self.scene_hash)),
@@ -66,8 +70,10 @@ impl FrameDescription {
             ("samples per pixel", self.spp.to_string()),
             ("resolution", format!("{}x{}", self.resolution[0], self.resolution[1])),
             ("pixels", format!("{x0},{x1},{y0},{y1}")),
+            ("overscan", self.overscan.to_string()),
             ("channels", self.aovs.iter().map(film::Aov::name).collect::<Vec<_>>().join(",")),
             ("filter", self.filtering.name().to_owned() + &filter.collect::<String>()),
+            ("cells", cells),
         ]
     }
 

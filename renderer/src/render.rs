@@ -350,10 +350,13 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         filename: description.film.filename.clone(),
     };
     if description.filtering != Filtering::None {
-        description.surroundings.unit = match world.geometry.alpha_test(&world.textures) {
-            None => unit(&world, &Opaque(world.geometry.scene()), seed),
-            Some(alpha) => unit(&world, &AlphaTested { scene: world.geometry.scene(), alpha }, seed),
+        let pilot = match world.geometry.alpha_test(&world.textures) {
+            None => Pilot::new(&world, &Opaque(world.geometry.scene()), seed),
+            Some(alpha) => Pilot::new(&world, &AlphaTested { scene: world.geometry.scene(), alpha }, seed),
         };
+        let Surroundings { unit, anchor, .. } = &mut description.surroundings;
+        *unit = pilot.unit;
+        anchor.extent = anchor.extent.min(pilot.extent);
     }
     Ok(Prepared { world, description, statistics, device, ids })
 }
@@ -535,6 +538,10 @@ fn trace_passes<Q: Queries + Sync>(
         if rest.start < pass.end {
             break;
         }
+        if rest.is_empty() {
+            // What was stored of a frame may have gaps.
+            rest = frame.samples.missing(&frame.description.asked);
+        }
     }
     None
 }
@@ -669,31 +676,45 @@ fn first_look(rest: &Range<u64>, done: u64, look: u64) -> u64 {
     if end < rest.end && (rest.end - end).saturating_mul(8) > look { end } else { rest.end }
 }
 
-/// Radiance of the order of the frame's mean, from a few paths all over it: the same for every part of the frame's
-/// samples.
-fn unit<Q: Queries>(world: &World, queries: &Q, seed: u64) -> f32 {
-    let sampler = Sampler::new(seed);
-    let [width, height] = world.sensor.resolution;
-    let (mut sum, mut lit) = (0.0, 0.0);
-    for k in 0..PILOT_PATHS {
-        // Rows and columns by two numbers without common structure.
-        let at = sampler.pixel_sample([0, 0], k).d2(Dimension::FILM);
-        let pixel = [(at.x * width as f32) as u32, (at.y * height as f32) as u32];
-        let numbers = sampler.pixel_sample(pixel, u64::MAX - k);
-        let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
-        let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
-        let mut path = Path::new(&camera, numbers, Unrecorded);
-        integrator::trace(world, queries, std::iter::once(&mut path), false, &mut Counters::default());
-        let radiance = f64::from(path.end().0.radiance.element_sum() / 3.0);
-        if radiance > 0.0 && radiance.is_finite() {
-            sum += radiance;
-            lit += 1.0;
-        }
-    }
-    if lit > 0.0 { (sum / lit) as f32 } else { 1.0 }
+/// What a few paths all over the frame find, the same for every part of the frame's samples.
+struct Pilot {
+    /// Radiance of the order of the frame's mean.
+    unit: f32,
+    /// A length of the order of what is seen, which a thing that is far from everything does not change: four times the
+    /// median distance to the first hit. Infinite if nothing is hit.
+    extent: f64,
 }
 
-/// Paths that find the order of the frame's radiance, of which a power of two matters.
+impl Pilot {
+    fn new<Q: Queries>(world: &World, queries: &Q, seed: u64) -> Self {
+        let sampler = Sampler::new(seed);
+        let [width, height] = world.sensor.resolution;
+        let (mut sum, mut lit) = (0.0, 0.0);
+        let mut distances = Vec::new();
+        for k in 0..PILOT_PATHS {
+            // Rows and columns by two numbers without common structure.
+            let at = sampler.pixel_sample([0, 0], k).d2(Dimension::FILM);
+            let pixel = [(at.x * width as f32) as u32, (at.y * height as f32) as u32];
+            let numbers = sampler.pixel_sample(pixel, u64::MAX - k);
+            let film_point = glam::Vec2::new(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5);
+            let Some(camera) = world.camera.ray(film_point, numbers.d2(Dimension::LENS)) else { continue };
+            let mut path = Path::new(&camera, numbers, Unrecorded);
+            integrator::trace(world, queries, std::iter::once(&mut path), true, &mut Counters::default());
+            let (sample, _) = path.end();
+            distances.extend((sample.first.depth > 0.0).then_some(sample.first.depth));
+            let radiance = f64::from(sample.radiance.element_sum() / 3.0);
+            if radiance > 0.0 && radiance.is_finite() {
+                sum += radiance;
+                lit += 1.0;
+            }
+        }
+        distances.sort_unstable_by(f32::total_cmp);
+        let median = distances.get(distances.len() / 2).map_or(f64::INFINITY, |distance| f64::from(*distance));
+        Self { unit: if lit > 0.0 { (sum / lit) as f32 } else { 1.0 }, extent: 4.0 * median }
+    }
+}
+
+/// Paths that find the orders of the frame's radiance and distances, of which a power of two matters.
 const PILOT_PATHS: u64 = 512;
 
 /// Traces samples `pass` of every pixel of one tile.

@@ -104,6 +104,25 @@ fn scale_by_a_power_of_two_changes_no_bit() {
 }
 
 #[test]
+fn what_is_far_from_everything_leaves_cells_as_they_are() {
+    let text = room([64, 48], 1.0, 1.0, GLOSSY);
+    let near = SceneFile::new(&text).render(job(8, adaptive()));
+    // Behind the camera, where no path sees it: the room is closed.
+    let far = |distance: f64| {
+        let triangle =
+            format!("Shape \"trianglemesh\" \"point3 P\" [ {distance} 0 0  {distance} 1 0  {distance} 0 1 ]\n");
+        let frame = SceneFile::new(&(text.clone() + &triangle)).render(job(8, adaptive()));
+        (counts(&frame).cells, frame)
+    };
+    for distance in [1e3, 1e6] {
+        let (cells, _) = far(distance);
+        println!("a triangle {distance} away: {cells} cells for {} (bound: a tenth)", counts(&near).cells);
+        // Shifts of the order of the scene's size may be others, so borders lie elsewhere.
+        assert!(10 * cells.abs_diff(counts(&near).cells) <= counts(&near).cells, "{distance}: {cells}");
+    }
+}
+
+#[test]
 fn light_by_a_power_of_two_changes_only_exponents() {
     let at = |light: f32| SceneFile::new(&room([64, 48], 1.0, light, GLOSSY)).render(job(8, adaptive()));
     let one = values(&at(1.0));

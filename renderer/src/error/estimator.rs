@@ -55,8 +55,25 @@ pub(super) fn estimate(film: &Film, earlier: Option<&Earlier>) -> (Vec<Rgb>, Opt
     };
     let errors = pooled(local, &weights, level, width);
     let total: f64 = pixels.iter().map(|p| f64::from(luminance(p.value.as_vec3()))).sum();
+    if !is_known(total, pixels.iter().map(|p| f64::from(luminance(p.noise.abs().as_vec3()))).collect()) {
+        return (errors, None);
+    }
     let noise = errors.iter().map(|error| f64::from(luminance(*error))).sum::<f64>() / total.max(f64::MIN_POSITIVE);
     (errors, Some(Estimate { relmse, interval, noise }))
+}
+
+/// Whether there is light, of this sum, of which the worst pixels' noise is less than half. If not, hardly a path has found any
+/// yet, and that the best pixels agree on darkness says nothing of the error.
+fn is_known(light: f64, mut noise: Vec<f64>) -> bool {
+    noise.sort_unstable_by(|a, b| b.total_cmp(a));
+    // Of frames so small that none is left out, the worst pixel's.
+    let worst = noise.len().saturating_sub(kept(noise.len())).max(1);
+    light > 0.0 && 2.0 * noise.iter().take(worst).sum::<f64>() < light
+}
+
+/// How many of so many pixels are the best.
+fn kept(pixels: usize) -> usize {
+    ((pixels as f64 * BEST).round() as usize).clamp(1, pixels.max(1))
 }
 
 /// Standard errors from squares that were multiplied by `weights`.
@@ -82,7 +99,7 @@ pub(super) fn weight(square: DVec3, floor: DVec3) -> DVec3 {
 /// Which pixels are among the best by these squares.
 pub(super) fn best(squares: &[DVec3]) -> Vec<bool> {
     let sums: Vec<f64> = squares.iter().map(|square| square.element_sum()).collect();
-    let kept = ((sums.len() as f64 * BEST).round() as usize).clamp(1, sums.len().max(1));
+    let kept = kept(sums.len());
     let mut sorted = sums.clone();
     if sorted.is_empty() {
         return Vec::new();
@@ -112,6 +129,19 @@ pub(super) fn mean_and_error(squares: &[DVec3], kept: &[bool], width: usize) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_that_hardly_any_light_has_reached_is_not_judged() {
+        // Found by one half of the samples, light is as large as its noise.
+        let found = |lit: usize| (0..2000).map(|pixel| if pixel < lit { 1.0 } else { 0.0 }).collect::<Vec<_>>();
+        for lit in [0, 1, 2, 4] {
+            assert!(!is_known(lit as f64, found(lit)), "{lit}");
+        }
+        assert!(is_known(5.0, found(5)) && is_known(2000.0, found(2000)));
+        // A lamp of two pixels that all samples see.
+        assert!(is_known(1e4, vec![0.01; 2000]));
+        assert!(!is_known(0.0, Vec::new()));
+    }
 
     #[test]
     fn the_worst_thousandth_does_not_count() {
