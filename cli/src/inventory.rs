@@ -72,7 +72,7 @@ impl Inventory {
             lights: count(scene.lights.iter().map(|light| light_kind(&light.kind))),
             media: scene.media.iter().map(|medium| format!("{} ({})", medium.name, medium.kind)).collect(),
             features: features(scene),
-            assets: assets(scene),
+            assets: scene.assets().into_iter().map(Path::to_owned).collect(),
         };
         let emitters = shapes(scene).filter(|shape| shape.area_light.is_some()).count() as u64;
         if emitters > 0 {
@@ -209,27 +209,4 @@ fn features(scene: &Scene) -> Vec<&'static str> {
     .into_iter()
     .filter_map(|(name, needed)| needed.then_some(name))
     .collect()
-}
-
-/// Every mesh and image that the scene names, each once, in the order of their names.
-fn assets(scene: &Scene) -> Vec<PathBuf> {
-    let mut assets: Vec<&PathBuf> = Vec::new();
-    assets.extend(shapes(scene).filter_map(|shape| match &shape.kind {
-        ShapeKind::Ply { path, .. } => Some(path),
-        _ => None,
-    }));
-    assets.extend(scene.textures.iter().filter_map(|texture| match &texture.kind {
-        TextureKind::Image(image) => Some(&image.path),
-        _ => None,
-    }));
-    assets.extend(scene.materials.iter().filter_map(|material| material.normal_map.as_ref()));
-    assets.extend(scene.area_lights.iter().filter_map(|light| light.image.as_ref()));
-    assets.extend(scene.lights.iter().filter_map(|light| match &light.kind {
-        LightKind::Infinite { image, .. } | LightKind::Goniometric { image, .. } => image.as_ref(),
-        LightKind::Projection { image, .. } => Some(image),
-        LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Distant { .. } => None,
-    }));
-    assets.sort();
-    assets.dedup();
-    assets.into_iter().cloned().collect()
 }

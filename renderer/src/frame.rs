@@ -25,7 +25,7 @@ pub struct FrameDescription {
     pub spp: u64,
     /// Those of them that this job is to take.
     pub asked: Range<u64>,
-    /// Hash of the text of the scene's files.
+    /// Hash of the scene's files: [`crate::scene::Scene::hash`].
     pub scene_hash: u64,
     /// Width and height of the whole frame.
     pub resolution: [u32; 2],

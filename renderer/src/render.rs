@@ -331,7 +331,7 @@ pub fn prepare(job: &Job, observer: &dyn Observer) -> Result<Prepared, RenderErr
         seed,
         spp,
         asked,
-        scene_hash: description.sources.hash(),
+        scene_hash: description.hash(),
         resolution: world.sensor.resolution,
         overscan: world.sensor.overscan,
         bounds: world.sensor.bounds,

@@ -91,7 +91,7 @@ impl<'a> Studio<'a> {
         if let Err(why) = interrupt.listen() {
             log.warning(&format!("signals will end the study at once: {why}"));
         }
-        let scene = scene.sources.hash();
+        let scene = scene.hash();
         Ok(Self { arguments, folder, scene, progress, interrupt, log, total: 0.0, done: 0.0 })
     }
 

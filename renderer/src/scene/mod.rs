@@ -1,5 +1,6 @@
 //! What a scene file says: plain data, before anything is built from it.
 
+mod assets;
 pub mod description;
 pub mod diagnostic;
 mod origin;
