@@ -183,7 +183,8 @@ pub struct QualityArguments {
     /// Take only samples A to B - 1 of each pixel
     #[arg(long, value_name = "A:B", value_parser = sample_range)]
     pub sample_range: Option<Range<u64>>,
-    /// Take slice I of N of the samples, I from 0: what filtered samples share stays within slices
+    /// Take slice I of N of the samples, I from 0. Slices are whole epochs of the filter: about 8 at most, and fewer below 32
+    /// samples, unless --filter-set epoch=N makes more
     #[arg(long, value_name = "I/N", value_parser = slice, conflicts_with = "sample_range")]
     pub slice: Option<Slice>,
     /// Seed of the random numbers [default: the scene's]

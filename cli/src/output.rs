@@ -32,7 +32,10 @@ impl OutputFile {
         };
         match draft::prepare(&target) {
             Ok(()) => Ok(Self { target }),
-            Err(why) if why.kind() == io::ErrorKind::NotFound => Err(failure(&"its folder does not exist")),
+            Err(why) if why.kind() == io::ErrorKind::NotFound => {
+                let folder = target.parent().unwrap_or(Path::new("")).display();
+                Err(failure(&format_args!("there is no folder \"{folder}\"; make it first, with mkdir -p")))
+            }
             Err(why) => Err(failure(&why)),
         }
     }
@@ -104,6 +107,7 @@ mod tests {
             let failure = OutputFile::prepare(&bad).unwrap_err();
             assert_eq!(failure.code(), 4, "{failure}");
             assert!(failure.to_string().contains(&*bad.to_string_lossy()), "{failure}");
+            assert_eq!(failure.to_string().contains("mkdir -p"), bad.ends_with("none/a.exr"), "{failure}");
         }
         assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
     }

@@ -70,11 +70,11 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// The samples of the slice, of `spp` in epochs that are not cut.
+    /// The samples of the slice, of `spp` in epochs ([`Filtering::slice_unit`]) that are not cut.
     ///
     /// # Errors
     /// There are fewer epochs than slices, or there is no such slice.
-    fn samples(self, spp: u64, epoch: u64) -> Result<Range<u64>, RenderError> {
+    pub fn samples(self, spp: u64, epoch: u64) -> Result<Range<u64>, RenderError> {
         let Self { index, count } = self;
         let epochs = spp.div_ceil(epoch);
         if index >= count || count > epochs {
@@ -166,8 +166,8 @@ pub enum RenderError {
     },
     /// There is no such slice.
     #[error(
-        "there is no slice {}/{}: slices count from 0, and {spp} samples that share by {epoch} make at most {epochs} slices; \
-         take fewer slices, more samples, or --filter-set epoch=N with a smaller N and growing=off", slice.index, slice.count
+        "there is no slice {}/{}: slices count from 0, and {spp} samples that share by {epoch} make at most {epochs}; \
+         take fewer slices or more samples{}", slice.index, slice.count, shorter_epoch(*slice, *spp, *epoch)
     )]
     Slice {
         /// The slice.
@@ -185,6 +185,17 @@ pub enum RenderError {
     /// The filter does not take its settings.
     #[error(transparent)]
     Filter(#[from] SettingError),
+}
+
+/// What else makes so many slices, if samples share: an epoch that slices have whole numbers of.
+fn shorter_epoch(slice: Slice, spp: u64, epoch: u64) -> String {
+    match (spp / slice.count.max(1)).checked_ilog2() {
+        Some(power) if 1 << power < epoch => format!(
+            ", or --filter-set epoch={},growing=off: samples share with fewer others, for a little more noise",
+            1u64 << power
+        ),
+        _ => String::new(),
+    }
 }
 
 fn count_errors(diagnostics: &[Diagnostic]) -> String {
@@ -867,6 +878,21 @@ mod tests {
             }
         }
         assert!(Slice { index: 2, count: 2 }.samples(16, 4).is_err());
+    }
+
+    #[test]
+    fn a_refused_slice_is_told_of_an_epoch_that_makes_it() {
+        for (spp, epoch, count, shorter) in
+            [(512, 64, 16, Some(32)), (100, 8, 16, Some(4)), (8, 4, 4, Some(2)), (4, 4, 8, None), (7, 1, 9, None)]
+        {
+            let slice = Slice { index: 0, count };
+            let refusal = slice.samples(spp, epoch).unwrap_err().to_string();
+            let told = shorter.map(|shorter| format!("epoch={shorter},"));
+            assert_eq!(refusal.contains("epoch="), told.is_some(), "{refusal}");
+            if let Some((told, shorter)) = told.zip(shorter) {
+                assert!(refusal.contains(&told) && slice.samples(spp, shorter).is_ok(), "{refusal}");
+            }
+        }
     }
 
     #[test]

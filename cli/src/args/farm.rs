@@ -75,7 +75,8 @@ pub struct SequenceArguments {
     /// Frames: 1-10, 1-10:2 or 1-10x2, 1..10, lists of these
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub frames: Frames,
-    /// Slices that each frame is cut into
+    /// Slices that each frame is cut into: about 8 at most, and fewer below 32 samples, unless --filter-set epoch=N after --
+    /// makes more
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub slices: u32,
     /// Processors that a task asks for [default: the engine's]
@@ -87,9 +88,9 @@ pub struct SequenceArguments {
     /// Name of the job [default: the output's]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// This program, as the farm's machines find it
-    #[arg(long, value_name = "PATH", default_value = "tessera")]
-    pub program: String,
+    /// This program, as the farm's machines find it [default: for Slurm where it is here, for OpenJD "tessera" on their PATH]
+    #[arg(long, value_name = "PATH")]
+    pub program: Option<String>,
     /// Options for every "tessera render": --spp, --filter, --aov, ...
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     pub options: Vec<String>,

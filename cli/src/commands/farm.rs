@@ -10,8 +10,11 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 use clap::Parser;
+use renderer::filtering::Filtering;
+use renderer::render::Slice;
+use renderer::{part, scene};
 
-use crate::args::{Arguments, Command, FarmArguments, FarmEngine, SequenceArguments};
+use crate::args::{Arguments, Command, FarmArguments, FarmEngine, RenderArguments, SequenceArguments};
 use crate::exit::Failure;
 use crate::job;
 use crate::log::Log;
@@ -22,7 +25,7 @@ const NOTICE_SECONDS: u32 = 90;
 /// Runs the command.
 pub fn run(arguments: &FarmArguments, log: &Log) -> Result<(), Failure> {
     match &arguments.engine {
-        FarmEngine::Openjd(arguments) => super::print(&openjd::template(arguments)?),
+        FarmEngine::Openjd(arguments) => super::print(&openjd::template(arguments, log)?),
         FarmEngine::Slurm(arguments) => slurm::write(arguments, log),
     }
 }
@@ -54,7 +57,7 @@ struct Task<'a> {
 impl<'a> Sequence<'a> {
     /// # Errors
     /// What no farm could render: frames without names of their own, options that a render would refuse.
-    fn new(arguments: &'a SequenceArguments) -> Result<Self, Failure> {
+    fn new(arguments: &'a SequenceArguments, log: &Log) -> Result<Self, Failure> {
         job::require_extension(&arguments.output, "exr", "the parts of a frame are merged to an OpenEXR image")?;
         let (scene, output) = (Place::of(&arguments.scene)?, Place::of(&arguments.output)?);
         job::distinct(&arguments.output, arguments.frames.numbers())?;
@@ -67,7 +70,7 @@ impl<'a> Sequence<'a> {
         let harmless = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
         let name = name.trim_start_matches('-').chars().map(harmless).take(100).collect();
         let sequence = Self { arguments, name, scene, output };
-        sequence.check_options()?;
+        sequence.check(log)?;
         Ok(sequence)
     }
 
@@ -110,8 +113,32 @@ impl<'a> Sequence<'a> {
         format!("{parts}/{}.####.s{slice}of{}.part", self.name, self.arguments.slices)
     }
 
-    /// Makes sure before anything is handed out that a render takes the options.
-    fn check_options(&self) -> Result<(), Failure> {
+    /// Makes sure before anything is handed out that renders take the options and parts can be merged.
+    fn check(&self, log: &Log) -> Result<(), Failure> {
+        let render = self.parse()?;
+        let refuse = |option, why| Err(Failure::Usage(format!("{option} cannot be given to slices: {why}")));
+        let quality = &render.quality;
+        for (given, option) in [
+            (quality.time_limit.is_some(), "--time-limit"),
+            (quality.target_error.is_some(), "--target-error"),
+            (quality.noise_threshold.is_some(), "--noise-threshold"),
+        ] {
+            if given {
+                return refuse(option, "a slice that stops early leaves a gap which no merge can fill");
+            }
+        }
+        if render.channels.stats.is_some() {
+            return refuse("--stats", "all slices of a frame would write the same file");
+        }
+        job::check_outputs(&render)?;
+        let filtering = job::filtering(&render.filter, false)?;
+        part::storable(&filtering).map_err(|why| Failure::Usage(why.to_string()))?;
+        job::check_sequence(&render, &filtering)?;
+        self.check_slices(&render, &filtering, log)
+    }
+
+    /// What the command line of a render comes to.
+    fn parse(&self) -> Result<RenderArguments, Failure> {
         let task = Task { scene: "scene.pbrt", parts: "parts", frames: "1", slice: "0", progress: "none" };
         let words = self.render(&task);
         let typed = ["tessera"].into_iter().chain(words.iter().chain(&self.arguments.options).map(String::as_str));
@@ -122,16 +149,53 @@ impl<'a> Sequence<'a> {
             Failure::Usage(format!("the options after -- cannot be given to every render: {}", message.trim_end()))
         })?;
         let Command::Render(render) = parsed.command else { unreachable!("the first word is \"render\"") };
-        job::filtering(&render.filter, false)?;
-        let refuse = |option, why| Err(Failure::Usage(format!("{option} cannot be given to slices: {why}")));
-        if render.quality.time_limit.is_some() {
-            return refuse("--time-limit", "a slice that stops early leaves a gap which no merge can fill");
+        Ok(*render)
+    }
+
+    /// Makes sure that the samples make so many slices, as far as that is known here.
+    fn check_slices(&self, render: &RenderArguments, filtering: &Filtering, log: &Log) -> Result<(), Failure> {
+        let count = u64::from(self.arguments.slices);
+        if count == 1 {
+            return Ok(());
         }
-        if render.channels.stats.is_some() {
-            return refuse("--stats", "all slices of a frame would write the same file");
+        let Some(spp) = render.quality.spp.or_else(|| self.spp_of_scene(render)) else {
+            log.warning(&format!(
+                "the scene cannot be read here: whether its samples make {count} slices the tasks will find out; --spp after -- \
+                 says how many samples there are"
+            ));
+            return Ok(());
+        };
+        let epoch = filtering.settled(spp).slice_unit();
+        let sizes =
+            (0..count).map(|index| Slice { index, count }.samples(spp, epoch).map(|range| range.end - range.start));
+        let sizes: Vec<u64> = sizes.collect::<Result<_, _>>().map_err(|why| Failure::Usage(why.to_string()))?;
+        if let Some(uneven) = uneven(&sizes, epoch) {
+            log.warning(&uneven);
         }
         Ok(())
     }
+
+    /// Samples that the scene of the first frame asks for, if it is to be read here.
+    fn spp_of_scene(&self, render: &RenderArguments) -> Option<u64> {
+        let first = *self.arguments.frames.numbers().first()?;
+        let scene = job::named(&self.arguments.scene, first);
+        let (scene, _) = scene::pbrt::load_mapped(&scene, &render.paths.map()).ok()?;
+        Some(scene.spp.max(1))
+    }
+}
+
+/// What to say where slices are not nearly alike, so that machines wait for others.
+fn uneven(sizes: &[u64], epoch: u64) -> Option<String> {
+    let (least, most) = (sizes.iter().min()?, sizes.iter().max()?);
+    let few = sizes.iter().filter(|size| *size == least).count();
+    (4 * (most - least) > *most).then(|| {
+        format!(
+            "the slices are not alike: {few} of {} {} {least} samples, the largest {most}; slices are whole epochs of {epoch} \
+             samples, the last of which may be shorter",
+            sizes.len(),
+            if few == 1 { "has" } else { "have" },
+        )
+    })
 }
 
 impl<'a> Place<'a> {
@@ -174,6 +238,9 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Level;
+
+    pub const QUIET: fn() -> Log = || Log::new(Level::Error);
 
     /// What `farm` does with a command line.
     pub fn parsed(words: &[&str]) -> FarmArguments {
@@ -186,7 +253,7 @@ mod tests {
 
     fn refusal(words: &[&str]) -> String {
         let FarmEngine::Openjd(arguments) = parsed(words).engine else { panic!("not openjd") };
-        Sequence::new(&arguments.sequence).err().expect("a refusal").to_string()
+        Sequence::new(&arguments.sequence, &QUIET()).err().expect("a refusal").to_string()
     }
 
     #[test]
@@ -200,7 +267,7 @@ mod tests {
         ] {
             let words = [&["openjd", "a.pbrt", "-o", output, "--frames", "1-2"], flags].concat();
             let FarmEngine::Openjd(arguments) = parsed(&words).engine else { panic!("not openjd") };
-            assert_eq!(Sequence::new(&arguments.sequence).ok().unwrap().name, name, "{output}");
+            assert_eq!(Sequence::new(&arguments.sequence, &QUIET()).ok().unwrap().name, name, "{output}");
         }
     }
 
@@ -213,14 +280,32 @@ mod tests {
             (&["--slice", "0/2"], &["--slice", "multiple times"]),
             (&["--filter-set", "cells=2"], &["--filter-set"]),
             (&["--time-limit", "3m"], &["--time-limit", "gap"]),
+            (&["--target-error", "0.01"], &["--target-error", "gap"]),
+            (&["--noise-threshold", "0.01"], &["--noise-threshold", "gap"]),
+            (&["--filter", "talk"], &["talk", "parts"]),
+            (&["--filter", "talk", "--temporal", "0.8"], &["talk", "parts"]),
+            (&["--aov", "motion"], &["motion"]),
             (&["--stats", "a.json"], &["--stats"]),
             (&["-o", "b.exr"], &["--output"]),
         ] {
             let refusal = refusal(&[&base, options].concat());
             assert!(words.iter().all(|word| refusal.contains(word)), "{options:?}: {refusal}");
         }
+        let sliced = |slices, options: &[&str]| refusal(&[&base[..6], &["--slices", slices, "--"], options].concat());
+        assert!(sliced("16", &["--spp", "512"]).contains("at most 8"));
+        assert!(sliced("4", &["--spp", "8"]).contains("epoch=2"));
+        assert!(sliced("9", &["--spp", "8", "--filter", "none"]).contains("at most 8"));
         assert!(refusal(&["openjd", "a.pbrt", "-o", "a.exr", "--frames", "1-2"]).contains("####"));
         assert!(refusal(&["openjd", "a.pbrt", "-o", "a.png", "--frames", "1"]).contains(".exr"));
         assert!(refusal(&["openjd", "a\nb.pbrt", "-o", "a.exr", "--frames", "1"]).contains("rename"));
+    }
+
+    #[test]
+    fn slices_that_others_wait_for_are_told() {
+        let told = |sizes: &[u64]| uneven(sizes, 8).unwrap_or_default();
+        let text = told(&[8, 16, 16, 12]);
+        assert!(text.contains("1 of 4 has 8 samples") && text.contains("largest 16") && text.contains("epochs of 8"));
+        assert!(told(&[2, 2, 3]).contains("2 of 3 have 2"));
+        assert!([&[170, 171, 171][..], &[64; 8], &[30, 40]].into_iter().all(|sizes| told(sizes).is_empty()));
     }
 }

@@ -149,11 +149,11 @@ fn parts_that_do_not_make_a_frame_are_refused_by_name() {
     assert_eq!(image.attribute("tessera/sampleRange"), Some(&oiio::Attribute::Text("0:16,48:64".into())));
     let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--spp", "16", "--slice", "4/7"]);
     assert_eq!(run.code, 2);
-    assert!(run.stderr.contains("at most 4 slices") && run.stderr.contains("epoch"), "{}", run.stderr);
+    assert!(run.stderr.contains("at most 4;") && run.stderr.contains("epoch"), "{}", run.stderr);
     let growing = ["--filter-set", "growing=on", "--spp", "64", "--slice", "0/2"];
     let run = bench.run(&[&["render", "scene.pbrt", "-o", "x.part"], &growing[..]].concat());
     assert_eq!(run.code, 2);
-    assert!(run.stderr.contains("at most 1 slices") && run.stderr.contains("growing=off"), "{}", run.stderr);
+    assert!(run.stderr.contains("make at most 1;") && run.stderr.contains("growing=off"), "{}", run.stderr);
     let run = bench.run(&["render", "scene.pbrt", "-o", "x.part", "--filter", "talk"]);
     assert_eq!(run.code, 2);
     assert!(run.stderr.contains("talk"), "{}", run.stderr);

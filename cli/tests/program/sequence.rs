@@ -95,8 +95,23 @@ fn job_files_are_for_the_engine() {
     bench.succeed(&[&["farm", "slurm"], &shot[..], &["--folder", "a/job", "--", "--spp", "32"]].concat());
     let mode = |name: &str| fs::metadata(bench.path(name)).unwrap().permissions().mode();
     assert!(mode("a/job/submit") & 0o111 != 0 && mode("a/job/render.sbatch") & 0o111 == 0);
-    assert!(String::from_utf8(bytes(&bench, "a/job/merge.sbatch")).unwrap().contains("\nexec tessera merge "));
+    // Unless told the scripts name this program, which no PATH need have.
+    let merge = String::from_utf8(bytes(&bench, "a/job/merge.sbatch")).unwrap();
+    assert!(merge.contains(&format!("\nexec {} merge ", env!("CARGO_BIN_EXE_tessera"))), "{merge}");
+    let mut openjd = bench.command(&[&["farm", "openjd"], &shot[..], &["--", "--spp", "32"]].concat());
+    let run = super::Run::of(openjd.env("PATH", "/nowhere").output().unwrap());
+    assert!(run.code == 0 && run.stderr.contains("--program"), "{}", run.stderr);
     bench.fail(&[&["farm", "openjd"], &shot[..], &["--", "--sp", "32"]].concat(), 2, &["--sp"]);
+    // As the scene has it, and where the scene is not to be read here.
+    let sixteen = ["-o", "out/shot.####.exr", "--frames", "1-2", "--slices", "16", "--folder", "b"];
+    bench.fail(&[&["farm", "slurm", "shot.####.pbrt"], &sixteen[..]].concat(), 2, &["at most 1;"]);
+    assert!(!bench.path("b").exists());
+    let run = bench.succeed(&[&["farm", "slurm", "elsewhere.####.pbrt"], &sixteen[..]].concat());
+    assert!(run.stderr.contains("--spp"), "{}", run.stderr);
+    let uneven =
+        ["farm", "openjd", "shot.####.pbrt", "-o", "a.#.exr", "--frames", "1", "--slices", "7", "--", "--spp", "100"];
+    let run = bench.succeed(&uneven);
+    assert!(run.stderr.contains("1 of 7 has 8 samples, the largest 16"), "{}", run.stderr);
 }
 
 #[test]

@@ -7,20 +7,27 @@ use std::path::{Component, Path};
 use super::{NOTICE_SECONDS, Place, Sequence, Task, plain, quoted};
 use crate::args::OpenjdArguments;
 use crate::exit::Failure;
+use crate::log::Log;
 
 /// The template, as YAML. Names and paths are values of its parameters, so that what they contain is no part of the
 /// template's own language, and engines can map paths to those of another machine.
 ///
 /// # Errors
 /// As [`Sequence::new`].
-pub fn template(arguments: &OpenjdArguments) -> Result<String, Failure> {
-    let sequence = Sequence::new(&arguments.sequence)?;
+pub fn template(arguments: &OpenjdArguments, log: &Log) -> Result<String, Failure> {
+    let sequence = Sequence::new(&arguments.sequence, log)?;
     for option in &arguments.sequence.options {
         if option.contains("{{") || option.contains(char::is_control) {
             return Err(Failure::Usage(format!(
                 "the option \"{option}\" cannot be told from the template's own language"
             )));
         }
+    }
+    if arguments.sequence.program.is_none() && !on_path(PROGRAM) {
+        log.warning(&format!(
+            "no \"{PROGRAM}\" is on the PATH here: where there is none on the workers' either, say where it is by --program or the \
+             job's parameter Program"
+        ));
     }
     let parameters = Parameters::of(&sequence, plain(&arguments.parts)?);
     let text = [
@@ -32,6 +39,15 @@ pub fn template(arguments: &OpenjdArguments) -> Result<String, Failure> {
         merge(&sequence, arguments.chunk),
     ];
     Ok(text.concat())
+}
+
+/// What workers call this program unless told.
+const PROGRAM: &str = "tessera";
+
+/// Whether a program of this name can be started here without a path.
+fn on_path(program: &str) -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&folders).any(|folder| folder.join(program).is_file())
 }
 
 /// Every session begins with making the folders, which need not exist where paths are mapped to.
@@ -78,7 +94,8 @@ impl Parameters {
         parameters.string("OutputFile", "The image; #### becomes the frame number.", file);
         parameters.folder("PartsFolder", "Slices on their way to the merge, and checkpoints.", "INOUT", parts);
         parameters.string("Frames", "Frames to render.", &sequence.arguments.frames.ascending());
-        parameters.string("Program", "The renderer, as workers find it.", &sequence.arguments.program);
+        let program = sequence.arguments.program.as_deref().unwrap_or(PROGRAM);
+        parameters.string("Program", "The renderer, as workers find it.", program);
         parameters
     }
 
@@ -178,12 +195,12 @@ fn yaml(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::args::FarmEngine;
-    use crate::commands::farm::tests::parsed;
+    use crate::commands::farm::tests::{QUIET, parsed};
 
     fn printed(words: &[&str]) -> Result<String, Failure> {
         let words = [&["openjd"], words].concat();
         let FarmEngine::Openjd(arguments) = parsed(&words).engine else { panic!("not openjd") };
-        template(&arguments)
+        template(&arguments, &QUIET())
     }
 
     #[test]

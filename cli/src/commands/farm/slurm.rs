@@ -17,7 +17,7 @@ use crate::output::OutputFile;
 pub fn write(arguments: &SlurmArguments, log: &Log) -> Result<(), Failure> {
     let folder = absolute(&arguments.folder)?;
     let failure = |why| Failure::Output(format!("cannot make the folder \"{}\": {why}", folder.display()));
-    let sequence = Sequence::new(&arguments.sequence)?;
+    let sequence = Sequence::new(&arguments.sequence, log)?;
     let scripts = Scripts::of(&sequence, &folder, arguments.retries)?;
     fs::create_dir_all(&folder).map_err(failure)?;
     for (name, text) in [("render.sbatch", scripts.render), ("merge.sbatch", scripts.merge), ("submit", scripts.submit)]
@@ -46,19 +46,31 @@ impl Scripts {
         let output = absolute(&sequence.arguments.output)?;
         let (scene, output, folder) = (plain(&scene)?, plain(&output)?, plain(folder)?);
         let images = Place::of(Path::new(output))?.folder;
+        let program = program(sequence)?;
         Ok(Self {
-            render: render(sequence, scene, folder),
-            merge: merge(sequence, output, folder),
+            render: render(sequence, &program, scene, folder),
+            merge: merge(sequence, &program, output, folder),
             submit: submit(sequence, images, folder, retries),
         })
     }
+}
+
+/// Where the program is: machines of a cluster share the folder that it is run from more often than a PATH.
+fn program(sequence: &Sequence<'_>) -> Result<String, Failure> {
+    if let Some(program) = &sequence.arguments.program {
+        return Ok(program.clone());
+    }
+    let here = std::env::current_exe().map_err(|why| {
+        Failure::Usage(format!("the system does not say where this program is ({why}): give --program"))
+    })?;
+    Ok(plain(&here)?.to_owned())
 }
 
 /// How often a task may be put back into the queue: beyond any night's preemptions, but not for ever.
 const MOST_RESTARTS: u32 = 50;
 
 /// One slice of one frame. The program takes the place of the shell, so that it is it whom Slurm's signals reach.
-fn render(sequence: &Sequence<'_>, scene: &str, folder: &str) -> String {
+fn render(sequence: &Sequence<'_>, program: &str, scene: &str, folder: &str) -> String {
     let task = Task {
         scene: "\"$scene\"",
         parts: "\"$parts\"",
@@ -92,13 +104,13 @@ exec {program} {words}
         cpus = cpus(sequence),
         scene = quoted(scene),
         parts = quoted(&format!("{folder}/parts")),
-        program = quoted(&sequence.arguments.program),
+        program = quoted(program),
         words = words.join(" "),
     )
 }
 
 /// All slices of one frame to its image.
-fn merge(sequence: &Sequence<'_>, output: &str, folder: &str) -> String {
+fn merge(sequence: &Sequence<'_>, program: &str, output: &str, folder: &str) -> String {
     let words = sequence.merge("\"$parts\"", "\"$1\"", "\"$output\"");
     format!(
         "\
@@ -117,7 +129,7 @@ exec {program} {words}
         cpus = cpus(sequence),
         output = quoted(output),
         parts = quoted(&format!("{folder}/parts")),
-        program = quoted(&sequence.arguments.program),
+        program = quoted(program),
         words = words.join(" "),
     )
 }
@@ -176,11 +188,11 @@ mod tests {
 
     use super::*;
     use crate::args::FarmEngine;
-    use crate::commands::farm::tests::parsed;
+    use crate::commands::farm::tests::{QUIET, parsed};
 
     fn scripts(words: &[&str], folder: &Path) -> Scripts {
         let FarmEngine::Slurm(arguments) = parsed(words).engine else { panic!("not slurm") };
-        let sequence = Sequence::new(&arguments.sequence).ok().unwrap();
+        let sequence = Sequence::new(&arguments.sequence, &QUIET()).ok().unwrap();
         Scripts::of(&sequence, folder, arguments.retries).ok().unwrap()
     }
 
@@ -189,12 +201,15 @@ mod tests {
 
     #[test]
     fn a_task_is_requeued_told_in_time_and_gets_its_processors() {
-        let scripts = scripts(&[&LINE[..], &["--cpus", "4", "--", "--spp", "64"]].concat(), Path::new("/f"));
+        let scripts = scripts(
+            &[&LINE[..], &["--cpus", "4", "--program", "/bin/tessera", "--", "--spp", "64"]].concat(),
+            Path::new("/f"),
+        );
         for line in [
             "#SBATCH --requeue\n",
             "#SBATCH --signal=B:TERM@90\n",
             "#SBATCH --cpus-per-task=4\n",
-            "\nexec tessera render \"$scene\" -o \"$parts\"/shot.####.s\"$SLURM_ARRAY_TASK_ID\"of3.part --frames \"$1\" ",
+            "\nexec /bin/tessera render \"$scene\" -o \"$parts\"/shot.####.s\"$SLURM_ARRAY_TASK_ID\"of3.part --frames \"$1\" ",
             " --progress alf --spp 64\n",
         ] {
             assert!(scripts.render.contains(line), "{line}: {}", scripts.render);
