@@ -164,12 +164,12 @@ pub struct CheckpointArguments {
 /// Whether to go on from a checkpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Resume {
-    /// If there is one of this frame
+    /// If there is one; if it is of another picture, fail
     #[default]
     Auto,
-    /// Never: render from the start
+    /// Never: render from the start, and write over what is there
     Never,
-    /// Always: without one, fail
+    /// Always: without one of this frame, fail
     Require,
 }
 

@@ -64,22 +64,31 @@ impl<'a> Checkpoints<'a> {
     /// What an earlier run has left of this frame.
     ///
     /// # Errors
-    /// With `--resume require`: there is nothing, or nothing of this frame.
+    /// There is another frame's, or one that cannot be read. With `--resume require`: there is nothing, or nothing whole.
     pub fn begin(&self, description: &FrameDescription) -> Result<Option<Accumulation>, Failure> {
         let Some(path) = self.path.as_deref().filter(|_| self.resume != Resume::Never) else { return Ok(None) };
-        if self.resume == Resume::Auto && !path.exists() {
-            return Ok(None);
+        if !path.exists() {
+            return match self.resume {
+                Resume::Require => Err(Failure::Input(format!(
+                    "--resume require: there is no checkpoint \"{}\" to go on from",
+                    path.display()
+                ))),
+                Resume::Auto | Resume::Never => Ok(None),
+            };
         }
         match stored(path, description) {
             Ok(frame) => {
                 self.log.info(&format!("going on from {}: samples {} are there", path.display(), frame.samples));
                 Ok(Some(frame))
             }
-            Err(why) if self.resume == Resume::Auto => {
+            // Nobody has any more use for it.
+            Err(why @ (PartError::Damaged(_) | PartError::Truncated(_))) if self.resume == Resume::Auto => {
                 self.log.warning(&format!("{why}; rendering from the start"));
                 Ok(None)
             }
-            Err(why) => Err(Failure::Input(why.to_string())),
+            Err(why) => Err(Failure::Input(format!(
+                "{why}; it is left as it is: give --resume never to start over, or --checkpoint another file"
+            ))),
         }
     }
 

@@ -179,7 +179,7 @@ fn a_render_goes_on_from_its_checkpoint_to_the_same_bytes() {
     }
     let run = bench.run(&["render", "scene.pbrt", "-o", "a.exr", "--checkpoint", "none", "--resume", "require"]);
     assert_eq!(run.code, 3);
-    assert!(run.stderr.contains("none"), "{}", run.stderr);
+    assert!(run.stderr.contains("--resume require") && run.stderr.contains("\"none\""), "{}", run.stderr);
 }
 
 /// The last epoch may be shorter than the others: it is over with the frame.
@@ -251,13 +251,22 @@ fn a_checkpoint_of_something_else_is_not_gone_on_with() {
     let checkpoint = ["--checkpoint", "a.checkpoint", "--checkpoint-interval", "1p"];
     render(&bench, &[&["-o", "a.exr", "--time-limit", "0.000001s"], &checkpoint[..]].concat());
     let job = ["render", "scene.pbrt", "-o", "b.exr", "--spp", "16", "--aov", "all", "--checkpoint", "a.checkpoint"];
-    let run = bench.run(&[&job[..], &["--resume", "require"]].concat());
-    assert_eq!(run.code, 3);
-    assert!(run.stderr.contains("samples per pixel") && run.stderr.contains("\"16\""), "{}", run.stderr);
-    let run = bench.succeed(&job);
-    assert!(run.stderr.contains("rendering from the start"), "{}", run.stderr);
+    let before = bytes(&bench, "a.checkpoint");
+    for resume in ["require", "auto"] {
+        let words = ["samples per pixel", "\"16\"", "--resume never", "--checkpoint"];
+        bench.fail(&[&job[..], &["--quiet", "--resume", resume]].concat(), 3, &words);
+        assert!(bytes(&bench, "a.checkpoint") == before && !bench.path("b.exr").exists(), "{resume}");
+    }
+    bench.succeed(&[&job[..], &["--resume", "never"]].concat());
+    assert!(!bench.path("a.checkpoint").exists());
     bench.succeed(&["render", "scene.pbrt", "-o", "c.exr", "--spp", "16", "--aov", "all"]);
     assert!(bytes(&bench, "b.exr") == bytes(&bench, "c.exr"));
+    // What is damaged is of no use to anybody.
+    std::fs::write(bench.path("a.checkpoint"), &before[..before.len() - 100]).unwrap();
+    let whole = ["render", "scene.pbrt", "-o", "a.exr", "--spp", "64", "--aov", "all", "--checkpoint", "a.checkpoint"];
+    bench.fail(&[&whole[..], &["--resume", "require"]].concat(), 3, &["a.checkpoint"]);
+    let run = bench.succeed(&whole);
+    assert!(run.stderr.contains("rendering from the start"), "{}", run.stderr);
 }
 
 #[test]
