@@ -69,11 +69,31 @@ impl Error {
     pub fn summary(&self) -> String {
         let [low, high] = self.interval;
         format!(
-            "estimated relMSE {:.2e} (95 %: {low:.2e} to {high:.2e}), noise {:.2} %",
-            self.relmse,
+            "estimated relMSE {} (95 %: {} to {}), noise {:.2} %",
+            figure(self.relmse),
+            figure(low),
+            figure(high),
             100.0 * self.noise
         )
     }
+}
+
+/// A number of bytes, as people read it.
+pub fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        bytes if bytes >= 1e9 => format!("{:.2} GB", bytes / 1e9),
+        bytes if bytes >= 1e6 => format!("{:.1} MB", bytes / 1e6),
+        bytes => format!("{:.1} kB", bytes / 1e3),
+    }
+}
+
+/// A figure to three digits, as people read it.
+pub fn figure(x: f64) -> String {
+    if x != 0.0 && !(0.01..1e4).contains(&x.abs()) {
+        return format!("{x:.2e}");
+    }
+    let decimals = if x == 0.0 { 0.0 } else { 2.0 - x.abs().log10().floor() };
+    format!("{x:.*}", decimals.max(0.0) as usize)
 }
 
 /// Wall-clock seconds of the phases.
@@ -129,7 +149,7 @@ pub struct Memory {
 pub struct Filter {
     /// Which filter.
     pub name: &'static str,
-    /// Wall-clock seconds.
+    /// Wall-clock seconds, without what noting paths for the filter costs while they are traced.
     pub seconds: f64,
     /// Those over the seconds of rendering.
     pub share: f64,
@@ -220,7 +240,8 @@ impl Filter {
             }
         };
         format!(
-            "filter {}: {:.2} s, {:.1} % of rendering; {} paths shared {} cells; {detail}; {:.1} MB; {} unfiltered",
+            "filter {}: {:.2} s, {:.1} % of rendering, beside what noting paths for it costs while they are traced; {} paths shared \
+             {} cells; {detail}; {:.1} MB; {} unfiltered",
             self.name,
             self.seconds,
             100.0 * self.share,
@@ -293,6 +314,16 @@ mod tests {
         // In this order: other tests take memory in between.
         let resident = resident_memory();
         assert!(peak_memory() >= resident);
+    }
+
+    #[test]
+    fn figures_have_three_digits() {
+        for (x, text) in
+            [(1.3, "1.30"), (0.0123, "0.0123"), (123.4, "123"), (0.0071, "7.10e-3"), (2e5, "2.00e5"), (0.0, "0")]
+        {
+            assert_eq!(figure(x), text);
+        }
+        assert_eq!([1_000, 2_500_000, 8_000_000_000].map(size), ["1.0 kB", "2.5 MB", "8.00 GB"]);
     }
 
     #[test]

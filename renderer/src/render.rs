@@ -241,6 +241,8 @@ pub struct Statistics {
     pub passes: u64,
     /// Rays and samples.
     pub counters: Counters,
+    /// Those of them that an earlier run had traced.
+    pub restored: Counters,
     /// Bytes that Embree held, at most.
     pub embree_bytes: u64,
     /// Bytes of the film.
@@ -466,6 +468,7 @@ pub fn trace(
     frame.description = prepared.description;
     let clock = Clock { start, limit: time_limit, done: frame.samples.count() };
     let Prepared { world, mut statistics, ids, .. } = prepared;
+    statistics.restored = frame.counters;
     let ids = ids.as_ref();
     let last = match world.geometry.alpha_test(&world.textures) {
         None => {

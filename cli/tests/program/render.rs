@@ -372,3 +372,89 @@ fn a_render_knows_its_error_and_stops_at_a_target() {
     // Without a filter the estimate costs nothing and is always there.
     assert!(stats("a.json")["error"]["interval"][1].as_f64().unwrap() > 0.0);
 }
+
+/// The figures of `--stats`.
+fn stats(bench: &Bench, name: &str) -> serde_json::Value {
+    serde_json::from_slice(&bytes(bench, name)).unwrap()
+}
+
+/// Rays of a second are those that this run traced, and no time is counted twice.
+#[test]
+fn a_resumed_render_counts_what_it_did_itself() {
+    let bench = bench();
+    let job =
+        ["render", "scene.pbrt", "-o", "a.exr", "--spp", "256", "--stats", "a.json", "--checkpoint", "a.checkpoint"];
+    bench.succeed(&[&job[..], &["--time-limit", "0.000001s"]].concat());
+    let first = stats(&bench, "a.json");
+    bench.succeed(&[&job[..], &["--resume", "require"]].concat());
+    let all = stats(&bench, "a.json");
+    let rays = |stats: &serde_json::Value| {
+        ["closest_hit", "shadow"].iter().map(|kind| stats["rays"][*kind].as_f64().unwrap()).sum::<f64>()
+    };
+    for (stats, traced) in [(&first, rays(&first)), (&all, rays(&all) - rays(&first))] {
+        let seconds = |phase: &str| stats["seconds"][phase].as_f64().unwrap();
+        let told = stats["rays"]["per_second"].as_f64().unwrap() * seconds("render");
+        assert!((told / traced - 1.0).abs() < 1e-9, "{told} of {traced}");
+        let phases: f64 = ["parse", "compile", "render", "write"].into_iter().map(seconds).sum();
+        assert!(phases <= seconds("total"), "{stats}");
+    }
+}
+
+#[test]
+fn a_goal_that_is_missed_is_told() {
+    let bench = bench();
+    for (filter, goal, words) in [
+        ("adaptive", ["--target-error", "0.0001"], "the target 1.00e-4 of the relMSE"),
+        ("none", ["--noise-threshold", "0.0001"], "the target 1.00e-4 of the noise"),
+    ] {
+        let job = ["render", "scene.pbrt", "-o", "a.exr", "--spp", "16", "--filter", filter];
+        let run = bench.succeed(&[&job[..], &goal].concat());
+        assert!(run.stderr.contains(words) && run.stderr.contains("16 samples were taken"), "{}", run.stderr);
+    }
+    let run = bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--target-error", "10", "--spp", "16"]);
+    assert!(!run.stderr.contains("not reached"), "{}", run.stderr);
+    let run = bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--spp", "1", "--threads", "1"]);
+    assert!(run.stderr.contains("1 sample each") && run.stderr.contains("on 1 thread;"), "{}", run.stderr);
+}
+
+#[test]
+fn a_scene_without_light_and_channels_without_filter_are_told() {
+    let bench = bench();
+    let dark: String =
+        SCENE.lines().filter(|line| !line.contains("LightSource")).map(|line| format!("{line}\n")).collect();
+    bench.write("dark.pbrt", &dark);
+    let said = |scene: &str, options: &[&str], words: &str| {
+        let run = bench.succeed(&[&["render", scene, "-o", "a.exr"], options].concat());
+        run.stderr.matches(words).count()
+    };
+    assert_eq!(said("dark.pbrt", &[], "there is no light"), 1);
+    assert_eq!(said("scene.pbrt", &[], "there is no light"), 0);
+    let unfiltered = "direct, light are not";
+    let (light, other) = (["--aov", "light,albedo,direct"], ["--aov", "albedo"]);
+    assert_eq!(said("scene.pbrt", &light, unfiltered), 1);
+    assert_eq!(said("scene.pbrt", &other, "filtered,"), 0);
+    assert_eq!(said("scene.pbrt", &[&light[..], &["--filter", "none"]].concat(), unfiltered), 0);
+}
+
+#[test]
+fn what_cannot_be_is_answered_by_what_can() {
+    let bench = bench();
+    let render = ["render", "scene.pbrt", "-o", "a.exr"];
+    bench.fail(&[&render[..], &["--denoise"]].concat(), 2, &["tessera denoise"]);
+    bench.fail(&[&render[..], &["--memory-limit", "1M"]].concat(), 1, &["--memory-limit is 1.0 MB"]);
+    bench.fail(&[&render[..], &["--filter-set", "cells=2"]].concat(), 2, &["cells", "--filter-set help"]);
+    bench.succeed(&["render", "--filter-set", "help"]);
+    let slice = ["render", "scene.pbrt", "-o", "a.part", "--spp", "32", "--slice", "0/2"];
+    bench.fail(&[&slice[..], &["--time-limit", "1s"]].concat(), 2, &["--time-limit", "gap", "--checkpoint"]);
+    bench.fail(&[&slice[..], &["--target-error", "1"]].concat(), 2, &["--target-error", "gap"]);
+    bench.succeed(&[&slice[..], &["--time-limit", "1h", "--checkpoint", "a.checkpoint"]].concat());
+}
+
+#[test]
+fn a_material_that_nobody_named_is_the_default() {
+    let bench = bench();
+    bench.write("scene.pbrt", &SCENE.replace("Material", "# Material"));
+    bench.succeed(&["render", "scene.pbrt", "-o", "a.exr", "--aov", "CryptoMaterial"]);
+    let image = String::from_utf8_lossy(&bytes(&bench, "a.exr")).into_owned();
+    assert!(image.contains("{\"default\":"), "no material \"default\" in the manifest");
+}

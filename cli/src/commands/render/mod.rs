@@ -130,28 +130,27 @@ fn render(
     }
 
     progress.phase("write");
-    let start = Instant::now();
     let mut written = if job::is_part(&path) {
         write_part(traced, &pool, &output)?
     } else {
         write_image(traced, &pool, &reporter, arguments.channels.provenance)?
     };
     let past = written.frame.past.take();
-    let outcome = Outcome { path: &path, written, begin, write_seconds: start.elapsed().as_secs_f64() };
+    let outcome = Outcome { path: &path, written, begin };
     let stats = outcome.stats(arguments, &reporter);
     if let Some(file) = stats_file {
         let text = serde_json::to_string_pretty(&stats).expect("statistics are plain data with text keys");
         file.write((text + "\n").as_bytes())?;
     }
     if stopped {
-        outcome::tell(&stats, &outcome.written.frame, &reporter);
+        outcome::tell(arguments, &stats, &outcome.written.frame, &reporter);
         return Err(reporter.hindrance());
     }
     if finished {
         reporter.checkpoints.clear();
     }
     progress.finish(&path, stats.memory.peak_resident_bytes);
-    outcome::tell(&stats, &outcome.written.frame, &reporter);
+    outcome::tell(arguments, &stats, &outcome.written.frame, &reporter);
     outcome::judge(arguments, &stats)?;
     Ok(past)
 }
@@ -161,7 +160,8 @@ fn write_part(mut traced: Traced, pool: &ThreadPool, output: &OutputFile) -> Res
     let written = pool.install(|| part::write(&mut traced.frame, output.target()));
     let published = written.and_then(|written| written.publish(output.target()));
     published.map_err(|error| Failure::Output(error.to_string()))?;
-    Ok(Written { frame: traced.undeveloped(), losses: Losses::default(), error: None })
+    let seconds = start.elapsed().as_secs_f64();
+    Ok(Written { frame: traced.undeveloped(), losses: Losses::default(), error: None, seconds })
 }
 
 /// Writes the image.
@@ -177,12 +177,13 @@ fn write_image(
     }
     let mut frame = pool.install(|| traced.develop());
     let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
+    let start = Instant::now();
     let provenance = provenance.then_some(&frame.statistics);
     let mut attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
     attributes.extend(frame.past.as_ref().map(metadata::of_past));
     let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
-    Ok(Written { frame, losses, error })
+    Ok(Written { frame, losses, error, seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Makes sure that no file is written over another of the same frame.
@@ -195,6 +196,8 @@ fn apart(output: &OutputFile, checkpoint: Option<&OutputFile>, statistics: Optio
                 return Err(Failure::Usage(format!("{option} and {other_option} are both \"{path}\": name two files")));
             }
         }
+    // The filter's last work is part of rendering.
+    let start = Instant::now();
     }
     Ok(())
 }

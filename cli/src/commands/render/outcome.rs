@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use renderer::error::Estimate;
 use renderer::film::exr::Losses;
+use renderer::integrator::Counters;
 use renderer::render::Frame;
 
 use super::reporter::Reporter;
@@ -22,6 +23,8 @@ pub struct Written {
     pub losses: Losses,
     /// What is known of the frame's error.
     pub error: Option<Estimate>,
+    /// How long writing it took.
+    pub seconds: f64,
 }
 
 /// What became of the image.
@@ -32,18 +35,18 @@ pub struct Outcome<'a> {
     pub written: Written,
     /// When its render began.
     pub begin: Instant,
-    /// How long writing it took.
-    pub write_seconds: f64,
 }
 
 impl<'a> Outcome<'a> {
     /// In numbers.
     pub fn stats(&self, arguments: &'a RenderArguments, reporter: &Reporter<'_>) -> Stats<'a> {
-        let Written { frame, losses, error } = &self.written;
+        let Written { frame, losses, error, seconds } = &self.written;
         let (film, description, statistics) = (&frame.film, &frame.description, &frame.statistics);
         let counters = &statistics.counters;
         let ([x0, x1], [y0, y1]) = (description.in_frame(0), description.in_frame(1));
-        let queries = (counters.closest_hit_rays + counters.shadow_rays) as f64;
+        // Those of this run, whose seconds these are.
+        let queries = |counters: &Counters| counters.closest_hit_rays + counters.shadow_rays;
+        let traced = (queries(counters) - queries(&statistics.restored)) as f64;
         Stats {
             version: env!("CARGO_PKG_VERSION"),
             scene: &arguments.scene,
@@ -59,14 +62,14 @@ impl<'a> Outcome<'a> {
                 parse: statistics.parse_seconds,
                 compile: statistics.compile_seconds,
                 render: statistics.render_seconds,
-                write: self.write_seconds,
+                write: *seconds,
                 total: self.begin.elapsed().as_secs_f64(),
             },
             rays: Rays {
                 camera: counters.camera_rays,
                 closest_hit: counters.closest_hit_rays,
                 shadow: counters.shadow_rays,
-                per_second: if statistics.render_seconds > 0.0 { queries / statistics.render_seconds } else { 0.0 },
+                per_second: if statistics.render_seconds > 0.0 { traced / statistics.render_seconds } else { 0.0 },
             },
             primitives: Primitives { placed: statistics.primitives, unique: statistics.unique_primitives },
             memory: Memory {
@@ -87,8 +90,32 @@ impl<'a> Outcome<'a> {
     }
 }
 
+/// What to say of the goals that the frame was to reach and did not.
+fn missed(arguments: &RenderArguments, stats: &Stats<'_>) -> Vec<String> {
+    let [start, end] = stats.samples;
+    let goals = [
+        ("relMSE (--target-error)", arguments.quality.target_error, stats.error.map(|error| error.relmse)),
+        ("noise (--noise-threshold)", arguments.quality.noise_threshold, stats.error.map(|error| error.noise)),
+    ];
+    let missed = goals.into_iter().filter_map(|(what, goal, found)| {
+        let goal = goal.filter(|goal| found.is_none_or(|found| found > *goal))?;
+        let found = found.map_or("not known".to_owned(), |found| format!("about {}", stats::figure(found)));
+        let taken = many(end - start, "sample was", "samples were");
+        Some(format!(
+            "the target {} of the {what} was not reached: {taken} taken, and it is {found}",
+            stats::figure(goal)
+        ))
+    });
+    if stats.goal_reached { Vec::new() } else { missed.collect() }
+}
+
+/// A count with its noun.
+fn many(count: u64, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
+}
+
 /// Sums up for people.
-pub fn tell(stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
+pub fn tell(arguments: &RenderArguments, stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
     let log = reporter.log;
     let [start, end] = stats.samples;
     let asked = &frame.description.asked;
@@ -105,15 +132,17 @@ pub fn tell(stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
             reporter.hint()
         ));
     }
+    missed(arguments, stats).iter().for_each(|missed| log.warning(missed));
     if stats.problems.rejected_samples > 0 {
         let share = 100.0 * stats.problems.rejected_samples as f64 / stats.rays.camera.max(1) as f64;
         log.warning(&format!(
-            "{} samples ({share:.2e} %) were not finite or negative and count as black",
-            stats.problems.rejected_samples
+            "{} ({share:.2e} %) not finite or negative, which counts as black",
+            many(stats.problems.rejected_samples, "sample was", "samples were")
         ));
     }
     if stats.problems.values_beyond_half > 0 {
-        log.warning(&format!("{} values were too large for 16 bits", stats.problems.values_beyond_half));
+        let values = many(stats.problems.values_beyond_half, "value was", "values were");
+        log.warning(&format!("{values} too large for 16 bits"));
     }
     if let Some(filter) = &stats.filter {
         log.info(&filter.summary());
@@ -123,18 +152,18 @@ pub fn tell(stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
     let memory =
         stats.memory.peak_resident_bytes.map_or("unknown".into(), |bytes| format!("{:.2} GB", bytes as f64 / 1e9));
     log.info(&format!(
-        "wrote {}: {} x {} pixels, {} samples each, in {:.2} s (parse {:.2}, build {:.2}, render {:.2}, write {:.2}) on \
-         {} threads; {:.2} million rays a second; peak memory {memory}",
+        "wrote {}: {} x {} pixels, {} each, in {:.2} s (parse {:.2}, build {:.2}, render {:.2}, write {:.2}) on {}; {:.2} \
+         million rays a second; peak memory {memory}",
         stats.output.display(),
         x1 - x0,
         y1 - y0,
-        end - start,
+        many(end - start, "sample", "samples"),
         seconds.total,
         seconds.parse,
         seconds.compile,
         seconds.render,
         seconds.write,
-        stats.threads,
+        many(stats.threads as u64, "thread", "threads"),
         stats.rays.per_second / 1e6,
     ));
 }
@@ -146,7 +175,10 @@ pub fn tell(stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
 pub fn judge(arguments: &RenderArguments, stats: &Stats<'_>) -> Result<(), Failure> {
     let rejected = stats.problems.rejected_samples;
     if arguments.quality.strict && rejected > 0 {
-        return Err(Failure::Quality(format!("{rejected} samples had to be rejected (--strict)")));
+        return Err(Failure::Quality(format!(
+            "{} to be rejected (--strict)",
+            many(rejected, "sample had", "samples had")
+        )));
     }
     Ok(())
 }
