@@ -383,17 +383,18 @@ pub enum ReportFormat {
 #[command(after_help = "\
 Figures, of image I against reference R, over all pixels and the three channels:
   relMSE        mean of (I - R)² / (R² + 0.01 m²), m being the channel's mean in R; at the end of the line without the \
-                worst thousandth of the pixels, which is what renders estimate of themselves
+                worst thousandth of the pixels, which is what renders estimate of themselves and end at (--target-error)
   RMSE          root of the mean of (I - R)²
   mean ratio    mean of I over mean of R, a channel each
   blocks        median over 32 x 32 pixel blocks of the difference between the blocks' means, relative to R's
   SSIM          structural similarity of tone-mapped luminance, 1 where they look the same
   PSNR          peak signal over noise of tone-mapped values, dB
   HDR-FLIP      mean of what an eye sees when the images flip, at the exposures where it sees most; 0 to 1
-  predicted     relMSE that the image's own layer \"error\" stands for, and where that puts the measured one
+  predicted     relMSE that the image's own layer \"error\" stands for, and what is measured, with its 95 % interval
   z             difference of mean luminance in standard errors, of the frame and of its 8 x 8 blocks; p is the \
 probability that noise alone makes a block as bad. It needs a layer \"error\" in the image, takes the \
-reference's from such or from two of them, and needs pixels that are independent of each other, as without a filter
+reference's from such or from two of them, and needs pixels that are independent of each other: it is left out where the image or the reference says that \
+it was filtered
 
 Examples:
   tessera compare out.exr reference.exr -o difference.exr --max-relmse 0.02 || echo too noisy
@@ -427,6 +428,9 @@ pub struct CompareArguments {
     pub max_mean_difference: Option<f64>,
     /// Exit with 5 if the median difference of blocks is above this
     #[arg(long, value_name = "X", value_parser = threshold)]
+    /// Exit with 5 if the relMSE of the best 99.9 % of the pixels, at which --target-error aims, is above this
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub max_relmse_best: Option<f64>,
     pub max_block_difference: Option<f64>,
 }
 

@@ -173,7 +173,7 @@ mod tests {
     fn picture(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 3]) -> Picture {
         let pixels = (0..width * height).map(|at| value(at % width, at / width)).collect();
         let window = oiio::Window::at_origin(width, height);
-        Picture { width, height, pixels, data_window: window, display_window: window }
+        Picture { width, height, pixels, data_window: window, display_window: window, eight_bit: false, filter: None }
     }
 
     fn compare(image: &Picture, reference: &Picture) -> Comparison {

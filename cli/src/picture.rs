@@ -18,6 +18,10 @@ pub struct Picture {
     pub data_window: oiio::Window,
     /// The frame.
     pub display_window: oiio::Window,
+    /// Whether it was made for displays: 8 bits a value.
+    pub eight_bit: bool,
+    /// The filter that made it, if the file says that there was one.
+    pub filter: Option<String>,
 }
 
 impl Picture {
@@ -34,6 +38,10 @@ impl Picture {
             return Err(Failure::Input(format!("\"{}\" has no {wanted}; it has {has}", path.display())));
         };
         let linear = |value: f32| if image.eight_bit() { tone::linear_from_srgb(value) } else { value };
+        let filter = match image.attribute("tessera/filter") {
+            Some(oiio::Attribute::Text(filter)) if filter != "none" => filter.split(' ').next().map(str::to_owned),
+            _ => None,
+        };
         let pixel = |values: &[f32]| channels.map(|channel| channel.map_or(0.0, |channel| linear(values[channel])));
         Ok(Self {
             width: image.width,
@@ -41,6 +49,8 @@ impl Picture {
             pixels: image.pixels.chunks_exact(image.channels.len()).map(pixel).collect(),
             data_window: image.data_window,
             display_window: image.display_window,
+            eight_bit: image.eight_bit(),
+            filter,
         })
     }
 }

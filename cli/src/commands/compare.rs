@@ -32,7 +32,13 @@ pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
     // Errors are those of R G B.
     let errors = |path: &Path| if layer.is_none() { picture::layer(path, "error") } else { Ok(None) };
     let (own, known) = (errors(&arguments.image)?, errors(&arguments.reference)?);
-    let comparison = metric::compare(
+    if image.eight_bit != reference.eight_bit {
+        log.warning(
+            "one of the images has 8 bits a value, which are cut off at white and may be tone-mapped, the other is linear light: \
+             their figures say more of that than of the renders",
+        );
+    }
+    let mut comparison = metric::compare(
         &image,
         own.as_ref().map(|errors| errors.pixels.as_slice()),
         &Reference {
@@ -41,8 +47,11 @@ pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
             errors: known.as_ref().map(|errors| errors.pixels.as_slice()),
         },
     );
+    let filter = image.filter.as_ref().or(reference.filter.as_ref()).map(String::as_str);
+    // Blocks of pixels that share are not tested by their own errors.
+    let untested = filter.filter(|_| comparison.z_test.take().is_some());
     print(&match arguments.format {
-        ReportFormat::Text => text(&comparison),
+        ReportFormat::Text => text(&comparison, untested),
         ReportFormat::Json => json(&comparison),
     })?;
     if let Some(output) = output {
@@ -65,7 +74,8 @@ fn check_windows(image: &Picture, reference: &Picture) -> Result<(), Failure> {
     )))
 }
 
-fn text(result: &Comparison) -> String {
+/// `untested`: the filter that leaves no test of the difference.
+fn text(result: &Comparison, untested: Option<&str>) -> String {
     let ratio = |ratio: &Option<f64>| ratio.map_or("undefined".to_owned(), |ratio| format!("{ratio:.5}"));
     let [red, green, blue] = &result.relmse_channels;
     let [first, last] = result.flip_exposures;
@@ -92,13 +102,21 @@ fn text(result: &Comparison) -> String {
     );
     if let Some(Prediction { relmse, coverage, interval: [low, high] }) = &result.predicted {
         text += &format!(
-            "predicted    {relmse:.6}   of such images 95 % have {low:.6} to {high:.6}; {:.1} % of the values are within \
-             1.96 standard errors\n",
+            "predicted    {relmse:.6}   by its layer \"error\", {}; measured with 95 % certainty {low:.6} to {high:.6}; {:.1} % of \
+             the values are within 1.96 standard errors\n",
+            match relmse {
+                relmse if *relmse < *low => "too low",
+                relmse if *relmse > *high => "too high",
+                _ => "as measured",
+            },
             100.0 * coverage
         );
     }
     if let Some(ZTest { frame, worst, blocks, p }) = &result.z_test {
         text += &format!("z            {frame:+.2}   worst of {blocks} blocks {worst:+.2}, p = {p:.2e}\n");
+    }
+    if let Some(filter) = untested {
+        text += &format!("z            not tested: pixels that the filter \"{filter}\" made are not independent\n");
     }
     text
 }
@@ -143,6 +161,7 @@ fn judge(arguments: &CompareArguments, result: &Comparison) -> Result<(), Failur
     let from_one = |ratio: &Option<f64>| ratio.map_or(f64::INFINITY, |ratio| (ratio - 1.0).abs());
     let furthest = result.mean_ratio.iter().map(from_one).fold(0.0, f64::max);
     judge("the relMSE", result.relmse, arguments.max_relmse);
+    judge("the relMSE of the best 99.9 %", result.relmse_best, arguments.max_relmse_best);
     judge("the largest difference of a channel's mean", furthest, arguments.max_mean_difference);
     judge("the median difference of blocks", result.block_difference, arguments.max_block_difference);
     if result.non_finite != [0, 0] {

@@ -232,7 +232,15 @@ mod tests {
     fn picture(value: impl Fn(usize) -> f32) -> Picture {
         let window = oiio::Window::at_origin(64, 64);
         let pixels = (0..64 * 64).map(|at| [value(at); 3]).collect();
-        Picture { width: 64, height: 64, pixels, data_window: window, display_window: window }
+        Picture {
+            width: 64,
+            height: 64,
+            pixels,
+            data_window: window,
+            display_window: window,
+            eight_bit: false,
+            filter: None,
+        }
     }
 
     fn noise(at: usize, seed: u64) -> f32 {

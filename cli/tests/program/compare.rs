@@ -97,3 +97,37 @@ fn an_error_layer_and_a_second_reference_say_what_is_noise() {
     let text = bench.succeed(&halves[..5]).stdout;
     assert!(["predicted", "HDR-FLIP", "PSNR", "worst of 32 blocks"].iter().all(|word| text.contains(word)), "{text}");
 }
+
+#[test]
+fn filtered_images_are_not_tested_by_their_pixels() {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", super::SCENE);
+    for filter in ["none", "adaptive"] {
+        let output = format!("{filter}.exr");
+        bench.succeed(&["render", "scene.pbrt", "-o", &output, "--aov", "error", "--spp", "16", "--filter", filter]);
+    }
+    let plain = bench.succeed(&["compare", "none.exr", "none.exr"]).stdout;
+    assert!(plain.contains("worst of") && !plain.contains("not tested"), "{plain}");
+    let filtered = bench.succeed(&["compare", "adaptive.exr", "none.exr"]).stdout;
+    assert!(
+        filtered.contains("not tested") && filtered.contains("\"adaptive\"") && !filtered.contains("p ="),
+        "{filtered}"
+    );
+    let json = bench.succeed(&["compare", "adaptive.exr", "none.exr", "--format", "json"]).json();
+    assert!(json["z_test"].is_null() && !json["predicted"].is_null(), "{json}");
+    bench.succeed(&["preview", "none.exr", "-o", "none.png"]);
+    let run = bench.succeed(&["compare", "none.png", "none.exr"]);
+    assert!(run.stderr.contains("8 bits"), "{}", run.stderr);
+}
+
+/// One pixel of 2048 is off by 100 times its value; the other figure leaves the worst two of them out.
+#[test]
+fn a_gate_on_the_best_pixels_does_not_see_the_worst() {
+    let bench = Bench::new();
+    bench.write_image("r.exr", 64, 32, |_, _| [1.0; 3]);
+    bench.write_image("i.exr", 64, 32, |x, y| [if (x, y) == (3, 4) { 101.0 } else { 1.0 }; 3]);
+    bench.fail(&["compare", "i.exr", "r.exr", "--max-relmse", "1"], 5, &["the relMSE is"]);
+    bench.succeed(&["compare", "i.exr", "r.exr", "--max-relmse-best", "0.001"]);
+    bench.write_image("i.exr", 64, 32, |_, _| [1.5; 3]);
+    bench.fail(&["compare", "i.exr", "r.exr", "--max-relmse-best", "0.1"], 5, &["best 99.9 %"]);
+}
