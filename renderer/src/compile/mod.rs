@@ -86,6 +86,10 @@ pub fn world(
     let lights = geometry.as_ref().zip(emitters).and_then(|(geometry, emitters)| {
         report.keep(Lights::build(&scene.lights, &scene.area_lights, emitters, geometry.bounds()))
     });
+    if lights.as_ref().is_some_and(Lights::is_empty) {
+        let message = "there is no light in the scene: the picture is black".to_owned();
+        report.diagnostics.push(Diagnostic { severity: Severity::Warning, message, place: None });
+    }
     match (sensor, camera, filter, textures, geometry, materials, lights) {
         (Some(sensor), Some(camera), Some(filter), Some(textures), Some(geometry), Some(materials), Some(lights))
             if !report.failed() =>

@@ -22,7 +22,7 @@ impl Names {
     /// The names of a scene's surfaces.
     ///
     /// A shape has the name of its parameter `name`, or that of the object that it is defined in, or that of its file. A
-    /// material has that of its `MakeNamedMaterial`. What has no name is called after its place in the scene file. Instances
+    /// material has that of its `MakeNamedMaterial`, and the one of shapes that are given none is `default`. What has no name is called after its place in the scene file. Instances
     /// of an object are counted from 1, in their order in the scene, and the shapes of each have its number behind their
     /// names: `tree.1`.
     pub fn new(scene: &Scene, geometry: &Geometry) -> Self {
@@ -37,7 +37,10 @@ impl Names {
         let objects: HashMap<Span, Arc<str>> = shapes
             .map(|(shape, object)| (shape.span, of_shape(shape, object).unwrap_or_else(|| place(shape.span))))
             .collect();
-        let of_material = |material: &Material| material.name.as_deref().map(Arc::from);
+        let of_material = |material: &Material| {
+            let default = material.span == Span::default();
+            material.name.as_deref().or(default.then_some("default")).map(Arc::from)
+        };
         let materials: Vec<Arc<str>> =
             scene.materials.iter().map(|m| of_material(m).unwrap_or_else(|| place(m.span))).collect();
 

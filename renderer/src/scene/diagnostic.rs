@@ -151,13 +151,16 @@ impl Places<'_> {
         let from = (line_start.max(start.saturating_sub(REACH))..=start).find(is_boundary).unwrap_or(start);
         let to = (start..=line_end.min(start + REACH).max(start)).rev().find(is_boundary).unwrap_or(start);
         let before = String::from_utf8_lossy(&text[from..start]);
+        let before = if from > line_start { format!("… {before}") } else { before.into_owned() };
+        let after = String::from_utf8_lossy(&text[start..to]);
+        let after = after.trim_end_matches('\r');
         Place {
             path: path.clone(),
             line,
             column: 1 + String::from_utf8_lossy(&text[line_start..start]).chars().count(),
             before: before.chars().count(),
             width: String::from_utf8_lossy(&text[start..end]).chars().count().max(1),
-            text: (before + String::from_utf8_lossy(&text[start..to])).trim_end_matches('\r').to_owned(),
+            text: if to < line_end { format!("{before}{after} …") } else { before + after },
         }
     }
 }
@@ -187,6 +190,7 @@ mod tests {
         assert_eq!((place.line, place.column, place.width), (1, 5002, 4));
         assert!(place.text.chars().count() < 200);
         assert_eq!(place.text.chars().skip(place.before).take(4).collect::<String>(), "here");
+        assert!(place.text.starts_with("… \u{e9}") && place.text.ends_with("x …"), "{}", place.text);
     }
 
     #[test]
