@@ -16,6 +16,7 @@ use crate::frames::Frames;
 
 mod farm;
 mod paths;
+mod settings;
 mod study;
 
 pub use farm::{FarmArguments, FarmEngine, OpenjdArguments, SequenceArguments, SlurmArguments};
@@ -178,7 +179,7 @@ pub enum Resume {
 #[command(next_help_heading = "Quality")]
 pub struct QualityArguments {
     /// Samples per pixel [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = samples)]
     pub spp: Option<u64>,
     /// Take only samples A to B - 1 of each pixel
     #[arg(long, value_name = "A:B", value_parser = sample_range)]
@@ -215,8 +216,8 @@ pub struct FilterArguments {
     /// range only
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub filter: FilterKind,
-    /// Settings of the filter; one that it does not have is answered by a list of all
-    #[arg(long, value_name = "KEY=VALUE,...", value_delimiter = ',', value_parser = setting)]
+    /// Settings of the filter; "help" lists them all
+    #[arg(long, value_name = "KEY=VALUE,...", value_delimiter = ',', value_parser = settings::SettingParser)]
     pub filter_set: Vec<(String, String)>,
     /// Weight of earlier frames in a moving average over the frames of --frames, in [0, 1): with --filter talk
     #[arg(long, value_name = "ALPHA", value_parser = alpha)]
@@ -268,9 +269,13 @@ pub struct FrameArguments {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub struct ChannelArguments {
-    /// Auxiliary channels to write besides R G B A, or "all", which is all but the standard error of the pixels, "error"
+    /// Auxiliary channels to write besides R G B A, or "all", which is all but the standard error of the pixels, "error". Those
+    /// of light (direct, indirect, emission, light) are not filtered: they sum to the image of --filter none
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = aov_names())]
     pub aov: Vec<String>,
+    /// Known, to be refused with a reason.
+    #[arg(long, hide = true)]
+    pub denoise: bool,
     /// How it is stored.
     #[command(flatten)]
     pub encoding: EncodingArguments,
@@ -420,17 +425,17 @@ pub struct CompareArguments {
     /// How the answer is printed
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub format: ReportFormat,
-    /// Exit with 5 if the relMSE is above this
+    /// Exit with 5 if the relMSE of all pixels is above this
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub max_relmse: Option<f64>,
+    /// Exit with 5 if the relMSE of the best 99.9 % of the pixels, at which --target-error aims, is above this
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub max_relmse_best: Option<f64>,
     /// Exit with 5 if a channel's mean ratio is further than this from 1
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub max_mean_difference: Option<f64>,
     /// Exit with 5 if the median difference of blocks is above this
     #[arg(long, value_name = "X", value_parser = threshold)]
-    /// Exit with 5 if the relMSE of the best 99.9 % of the pixels, at which --target-error aims, is above this
-    #[arg(long, value_name = "X", value_parser = threshold)]
-    pub max_relmse_best: Option<f64>,
     pub max_block_difference: Option<f64>,
 }
 
@@ -569,6 +574,10 @@ fn aov_names() -> PossibleValuesParser {
 
 /// The output that compositors know and tessera has not.
 pub const MOTION: &str = "motion";
+
+fn samples(text: &str) -> Result<u64, String> {
+    text.parse().ok().filter(|samples| *samples > 0).ok_or_else(|| "expected a number of samples, 1 or more".to_owned())
+}
 
 fn sample_range(text: &str) -> Result<Range<u64>, String> {
     let wrong = || "expected first:end, such as 0:64 for the first 64 samples".to_owned();
@@ -709,7 +718,7 @@ mod tests {
     #[test]
     fn messages_name_the_flag_and_what_it_takes() {
         for (flags, words) in [
-            (&["--spp", "0"][..], ["--spp", "0"]),
+            (&["--spp", "0"][..], ["--spp", "1 or more"]),
             (&["--resolution", "640"], ["--resolution", "1280x720"]),
             (&["--pixel-bounds", "0,0,0,1"], ["--pixel-bounds", "X0 < X1"]),
             (&["--sample-range", "4:4"], ["4:4", "no sample"]),

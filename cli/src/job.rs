@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use oiio::Compression;
 use renderer::film::AovSet;
 use renderer::film::exr::Encoding;
-use renderer::filtering::Filtering;
+use renderer::filtering::{Filtering, SettingError};
 use renderer::render::RenderError;
 use renderer::scene::Severity;
 
@@ -58,6 +58,20 @@ pub fn distinct(output: &Path, frames: &[i32]) -> Result<(), Failure> {
     }
 }
 
+/// Makes sure that a scene file for each frame is not asked for without a frame.
+///
+/// # Errors
+/// It is.
+pub fn check_scene(scene: &Path) -> Result<(), Failure> {
+    if scene.exists() || named(scene, 0) == scene {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "there is no scene \"{}\": give --frame N or --frames LIST, which the frame number in its name is of",
+        scene.display()
+    )))
+}
+
 /// Makes sure that every frame has a scene, before the first is rendered.
 ///
 /// # Errors
@@ -89,7 +103,7 @@ pub fn require_extension(path: &Path, extension: &str, why: &str) -> Result<(), 
     Err(Failure::Usage(format!("the output \"{}\" does not end in .{extension}: {why}", path.display())))
 }
 
-/// Makes sure that a slice lies within the samples that are asked for.
+/// Makes sure that a slice lies within the samples that are asked for, and that a part of a frame will be whole.
 ///
 /// # Errors
 /// It does not.
@@ -99,8 +113,28 @@ pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
             "--sample-range {}:{} reaches beyond the {spp} samples of --spp",
             range.start, range.end
         ))),
-        _ => Ok(()),
+        _ => check_slice(arguments),
     }
+}
+
+/// Makes sure that a slice to be merged gets all its samples: no other has them.
+fn check_slice(arguments: &RenderArguments) -> Result<(), Failure> {
+    let quality = &arguments.quality;
+    if quality.slice.is_none() || !is_part(&arguments.output) {
+        return Ok(());
+    }
+    let refuse = |option, but| {
+        Err(Failure::Usage(format!(
+            "{option} cannot be given to a slice: one that stops early leaves a gap which no merge can fill{but}"
+        )))
+    };
+    if quality.target_error.is_some() || quality.noise_threshold.is_some() {
+        return refuse("--target-error or --noise-threshold", "");
+    }
+    if quality.time_limit.is_some() && arguments.checkpoint.checkpoint.is_none() {
+        return refuse("--time-limit", "; with --checkpoint the same command goes on");
+    }
+    Ok(())
 }
 
 /// Makes sure that there is something to show in all channels.
@@ -108,6 +142,10 @@ pub fn check_samples(arguments: &RenderArguments) -> Result<(), Failure> {
 /// # Errors
 /// There is not.
 pub fn check_outputs(arguments: &RenderArguments) -> Result<(), Failure> {
+    if arguments.channels.denoise {
+        let text = "a render is not denoised as it is written: \"tessera denoise frame.exr -o clean.exr\" makes another file of it";
+        return Err(Failure::Usage(text.into()));
+    }
     if arguments.channels.aov.iter().any(|name| name == MOTION) {
         return Err(Failure::Usage(
             "--aov motion: nothing moves in a frame, as motion within the shutter is not rendered and frames of a sequence \
@@ -171,7 +209,12 @@ pub fn check_sequence(arguments: &RenderArguments, filtering: &Filtering) -> Res
 /// Settings that the filter does not have or does not take.
 pub fn filter(kind: FilterKind, set: &[(String, String)]) -> Result<Filtering, Failure> {
     let mut filtering = Filtering::named(kind.name()).expect("every kind of the command line has a filter");
-    let usage = |error: renderer::filtering::SettingError| Failure::Usage(format!("--filter-set: {error}"));
+    let usage = |error: SettingError| match error {
+        SettingError::Unknown { .. } => {
+            Failure::Usage(format!("--filter-set: {error}; --filter-set help says what they mean"))
+        }
+        _ => Failure::Usage(format!("--filter-set: {error}")),
+    };
     for (key, value) in set {
         filtering.set(key, value).map_err(usage)?;
     }

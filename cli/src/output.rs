@@ -34,7 +34,7 @@ impl OutputFile {
             Ok(()) => Ok(Self { target }),
             Err(why) if why.kind() == io::ErrorKind::NotFound => {
                 let folder = target.parent().unwrap_or(Path::new("")).display();
-                Err(failure(&format_args!("there is no folder \"{folder}\"; make it first, with mkdir -p")))
+                Err(failure(&format_args!("the folder \"{folder}\" does not exist; make it first, with mkdir -p")))
             }
             Err(why) => Err(failure(&why)),
         }

@@ -4,6 +4,7 @@
 //! and what slots read stay until the end, when the film gets its filtered values.
 
 mod blend;
+mod explain;
 mod settings;
 mod tile;
 
@@ -15,6 +16,7 @@ use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 pub use blend::Blend;
+pub use explain::Explanation;
 pub use settings::SettingError;
 pub use tile::{Keep, Keeper, Nothing, Paths, Selection, Watching};
 

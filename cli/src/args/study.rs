@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{FilterKind, ProgressKind, Resolution, setting};
+use super::{FilterKind, ProgressKind, Resolution, samples, setting};
 
 /// Options of `study`.
 #[derive(Clone, Debug, Args)]
@@ -28,7 +28,7 @@ pub struct StudyArguments {
     pub output: PathBuf,
     /// Budgets: samples per pixel
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,4,16,64,256")]
-    #[arg(value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(value_parser = samples)]
     pub spp: Vec<u64>,
     /// Filters to compare
     #[arg(long, value_name = "KIND,...", value_enum, value_delimiter = ',', default_value = "none,talk,adaptive")]
@@ -43,7 +43,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "A.exr,B.exr", value_delimiter = ',', conflicts_with = "reference_spp")]
     pub reference: Vec<PathBuf>,
     /// Samples per pixel of each half of the reference [default: four times the largest budget]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = samples)]
     pub reference_spp: Option<u64>,
     /// Errors, as relMSE, whose price is wanted; the first is recommended for
     #[arg(long, value_name = "X,...", value_delimiter = ',', default_value = "0.01,0.1,0.001", value_parser = target)]

@@ -60,7 +60,7 @@ fn frames_without_names_of_their_own_are_refused() {
     bench.fail(&["merge", "a.#.part", "-o", "a.exr", "--frames", "1-2"], 2, &["a.exr", "####"]);
     bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr", "--frames", "1-"], 2, &["\"1-\"", "1-10x2"]);
     // Without a number a name is a name.
-    bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr"], 3, &["shot.####.pbrt"]);
+    bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr"], 3, &["shot.####.pbrt", "--frame", "--frames"]);
 }
 
 #[test]

@@ -385,8 +385,13 @@ impl Filtering {
 
     /// All settings and their values.
     pub fn settings(&self) -> Vec<(&'static str, String)> {
-        fn values<T>(settings: &[Setting<T>], all: &T) -> Vec<(&'static str, String)> {
-            settings.iter().map(|setting| (setting.key, (setting.get)(all))).collect()
+        self.described().into_iter().map(|(key, _, value)| (key, value)).collect()
+    }
+
+    /// All settings, what they may be and what they are.
+    pub(super) fn described(&self) -> Vec<(&'static str, &'static str, String)> {
+        fn values<T>(settings: &[Setting<T>], all: &T) -> Vec<(&'static str, &'static str, String)> {
+            settings.iter().map(|setting| (setting.key, setting.values, (setting.get)(all))).collect()
         }
         match *self {
             Self::None => Vec::new(),

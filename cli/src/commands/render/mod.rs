@@ -19,7 +19,7 @@ use renderer::render::{self, Job, Traced};
 
 use self::outcome::{Outcome, Written};
 use self::reporter::{MemoryLimit, Reporter};
-use crate::args::RenderArguments;
+use crate::args::{FilterKind, RenderArguments};
 use crate::checkpoint::Checkpoints;
 use crate::exit::Failure;
 use crate::interrupt::Interrupt;
@@ -51,6 +51,11 @@ fn sequence(
         let outputs = iter::once(&arguments.output).chain(&arguments.channels.stats);
         outputs.into_iter().try_for_each(|output| job::distinct(output, frames.numbers()))?;
         job::check_scenes(&arguments.scene, frames.numbers())?;
+    } else if arguments.frame.is_none() {
+        job::check_scene(&arguments.scene)?;
+    }
+    if arguments.filter.filter != FilterKind::None {
+        warn_of_unfiltered(&arguments.channels.aov, log);
     }
     let interrupt = Interrupt::default();
     if let Err(why) = interrupt.listen() {
@@ -67,6 +72,20 @@ fn sequence(
         past = render(&arguments, past, log, progress, &interrupt)?;
     }
     Ok(())
+}
+
+/// Says that channels of light are another picture than the one beside them.
+fn warn_of_unfiltered(aovs: &[String], log: &Log) {
+    let light = [Aov::Direct, Aov::Indirect, Aov::Emission, Aov::Light].map(Aov::name);
+    let asked = |name: &&str| aovs.iter().any(|aov| aov == "all" || aov == name);
+    let unfiltered: Vec<&str> = light.into_iter().filter(asked).collect();
+    if !unfiltered.is_empty() {
+        log.warning(&format!(
+            "R G B is filtered, {} {} not: they sum to the image of --filter none",
+            unfiltered.join(", "),
+            if unfiltered.len() == 1 { "is" } else { "are" }
+        ));
+    }
 }
 
 /// Renders a frame, on from what the one before it left, and returns what it leaves itself.
@@ -157,6 +176,7 @@ fn render(
 
 /// Writes the sums.
 fn write_part(mut traced: Traced, pool: &ThreadPool, output: &OutputFile) -> Result<Written, Failure> {
+    let start = Instant::now();
     let written = pool.install(|| part::write(&mut traced.frame, output.target()));
     let published = written.and_then(|written| written.publish(output.target()));
     published.map_err(|error| Failure::Output(error.to_string()))?;
@@ -176,8 +196,9 @@ fn write_image(
         reporter.log.verbose(&format!("{error}; its default stays"));
     }
     let mut frame = pool.install(|| traced.develop());
-    let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
+    // The filter's last work is part of rendering.
     let start = Instant::now();
+    let error = reporter.watch.as_ref().and_then(|watch| watch.finish(&mut frame.film));
     let provenance = provenance.then_some(&frame.statistics);
     let mut attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
     attributes.extend(frame.past.as_ref().map(metadata::of_past));
@@ -196,8 +217,6 @@ fn apart(output: &OutputFile, checkpoint: Option<&OutputFile>, statistics: Optio
                 return Err(Failure::Usage(format!("{option} and {other_option} are both \"{path}\": name two files")));
             }
         }
-    // The filter's last work is part of rendering.
-    let start = Instant::now();
     }
     Ok(())
 }

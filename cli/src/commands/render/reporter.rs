@@ -64,10 +64,10 @@ impl MemoryLimit {
         let least = stats::resident_memory().unwrap_or_default() + more;
         match self.bytes.filter(|limit| least > *limit) {
             Some(limit) => Err(Failure::Render(format!(
-                "the frame takes {:.2} GB at least, and --memory-limit is {:.2} GB: raise it, or render parts of the frame with \
+                "the frame takes {} at least, and --memory-limit is {}: raise it, or render parts of the frame with \
                  --crop, with fewer auxiliary outputs, or with --filter none",
-                least as f64 / 1e9,
-                limit as f64 / 1e9
+                stats::size(least),
+                stats::size(limit)
             ))),
             None => Ok(()),
         }
