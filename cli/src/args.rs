@@ -294,10 +294,10 @@ pub struct EncodingArguments {
     /// Compression of the image: all but dwaa keep every bit
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub compression: CompressionKind,
-    /// Layers to store in 16 bits: names of --aov, or "rgba"
+    /// Layers to store in 16 bits: names of --aov, "rgba", or "all" but mattes
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = layer_names(false))]
     pub half: Vec<String>,
-    /// Layers to store in 32 bits: names of --aov, or "rgba" [default: all but rgba]
+    /// Layers to store in 32 bits: names of --aov, "rgba", or "all" [default: all but rgba]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = layer_names(true))]
     pub float: Vec<String>,
 }
@@ -526,7 +526,8 @@ pub struct PreviewArguments {
     /// How light becomes display values
     #[arg(long, value_name = "KIND", value_enum, default_value_t)]
     pub tone: Tone,
-    /// Show the channels of this layer (as albedo or N) instead of R G B
+    /// Show the channels of this layer (as albedo or N) instead of R G B. Data is scaled: directions from -1..1 to black..white,
+    /// depth, P, sampleCount, variance, error and filter.* from their range
     #[arg(long, value_name = "NAME")]
     pub layer: Option<String>,
 }
@@ -560,11 +561,19 @@ impl FromStr for Resolution {
     }
 }
 
-/// Layers whose format may be chosen; ids take 32 bits.
+/// Layers whose format may be chosen, all of them by [`ALL`]; ids take 32 bits.
 fn layer_names(mattes: bool) -> PossibleValuesParser {
-    let aovs = Aov::ALL.into_iter().filter(move |aov| mattes || !aov.is_matte()).map(Aov::name);
-    PossibleValuesParser::new(std::iter::once(exr::RADIANCE).chain(aovs))
+    PossibleValuesParser::new(layers(mattes).chain([ALL]))
 }
+
+/// The layers of an image, with mattes or without.
+pub fn layers(mattes: bool) -> impl Iterator<Item = &'static str> {
+    let aovs = Aov::ALL.into_iter().filter(move |aov| mattes || !aov.is_matte()).map(Aov::name);
+    std::iter::once(exr::RADIANCE).chain(aovs)
+}
+
+/// What stands for all layers.
+pub const ALL: &str = "all";
 
 fn aov_names() -> PossibleValuesParser {
     let names = AovSet::names().chain(["all"]).map(PossibleValue::from);

@@ -10,7 +10,7 @@ use renderer::render::RenderError;
 use renderer::scene::Severity;
 
 use crate::args::{
-    CompressionKind, EncodingArguments, FilterArguments, FilterKind, MOTION, QualityArguments, RenderArguments,
+    self, CompressionKind, EncodingArguments, FilterArguments, FilterKind, MOTION, QualityArguments, RenderArguments,
 };
 use crate::exit::Failure;
 use crate::frame_name;
@@ -300,7 +300,14 @@ pub fn encoding(arguments: &EncodingArguments) -> Encoding {
         CompressionKind::Dwaa => Compression::Dwaa,
         CompressionKind::None => Compression::None,
     };
-    Encoding { compression, half: arguments.half.clone(), float: arguments.float.clone() }
+    // What is said of a layer by its name is heeded before what is said of all; 16 bits come first otherwise.
+    let named = |names: &[String], others: &[String], mattes| -> Vec<String> {
+        let all = names.iter().any(|name| name == args::ALL);
+        let rest = args::layers(mattes).filter(|layer| all && !others.iter().any(|other| other == layer));
+        names.iter().filter(|name| *name != args::ALL).cloned().chain(rest.map(str::to_owned)).collect()
+    };
+    let (half, float) = (&arguments.half, &arguments.float);
+    Encoding { compression, half: named(half, float, false), float: named(float, half, true) }
 }
 
 /// Refuses to damage what is to be stored.

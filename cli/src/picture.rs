@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use renderer::scene::pbrt::did_you_mean;
+
 use crate::exit::Failure;
 use crate::tone;
 
@@ -34,8 +36,10 @@ impl Picture {
         let image = oiio::read(path).map_err(|error| Failure::Input(error.to_string()))?;
         let Some(channels) = channels(&image.channels, layer) else {
             let wanted = layer.map_or_else(|| "channels R G B or Y".to_owned(), |layer| format!("layer {layer}"));
-            let has = image.channels.join(" ");
-            return Err(Failure::Input(format!("\"{}\" has no {wanted}; it has {has}", path.display())));
+            let layers = layers(&image.channels);
+            let meant = layer.map_or_else(String::new, |layer| did_you_mean(layer, layers.iter().copied()));
+            let has = layers.join(" ");
+            return Err(Failure::Input(format!("\"{}\" has no {wanted}; it has {has}{meant}", path.display())));
         };
         let linear = |value: f32| if image.eight_bit() { tone::linear_from_srgb(value) } else { value };
         let filter = match image.attribute("tessera/filter") {
@@ -62,6 +66,18 @@ impl Picture {
 pub fn layer(path: &Path, layer: &str) -> Result<Option<Picture>, Failure> {
     let image = oiio::read(path).map_err(|error| Failure::Input(error.to_string()))?;
     channels(&image.channels, Some(layer)).map(|_| Picture::read(path, Some(layer))).transpose()
+}
+
+/// The layers that channels are of, and those that are of none, each once.
+fn layers(channels: &[String]) -> Vec<&str> {
+    let mut layers: Vec<&str> = Vec::new();
+    for channel in channels {
+        let layer = channel.rsplit_once('.').map_or(channel.as_str(), |(layer, _)| layer);
+        if !layers.contains(&layer) {
+            layers.push(layer);
+        }
+    }
+    layers
 }
 
 /// Where the channels of a layer are.

@@ -36,7 +36,9 @@ pub fn unused() -> f64 {
 /// `curves +12 %, quadrics less than 1 %`.
 pub fn in_words(prices: &[Price]) -> String {
     let words = |price: &Price| match price.used_percent {
-        percent if percent.abs() < 0.5 => format!("{} less than 1 %", price.feature),
+        // Below what the measurement resolves.
+        percent if percent <= 0.0 => format!("{} 0 %", price.feature),
+        percent if percent < 0.5 => format!("{} less than 1 %", price.feature),
         percent => format!("{} {percent:+.0} %", price.feature),
     };
     prices.iter().map(words).collect::<Vec<_>>().join(", ")
@@ -57,6 +59,6 @@ mod tests {
     fn prices_are_for_people() {
         let price = |feature: &str, used_percent| Price { feature: feature.into(), unused_percent: 0.0, used_percent };
         let words = in_words(&[price("curves", 12.4), price("crop", 0.3), price("clamping", -1.6)]);
-        assert_eq!(words, "curves +12 %, crop less than 1 %, clamping -2 %");
+        assert_eq!(words, "curves +12 %, crop less than 1 %, clamping 0 %");
     }
 }

@@ -228,7 +228,7 @@ impl FrameFilter {
         matches!(self.sharing, Sharing::Adaptive(..))
     }
 
-    /// Whether the frame may end anywhere, as nothing is to be added to it later: no block needs to be whole.
+    /// Whether the frame may end anywhere, if nothing is added to it later: then no block needs to be whole.
     pub fn is_open(&self) -> bool {
         matches!(self.blocks.filtering, Filtering::Adaptive(params, _) if params.growing)
     }

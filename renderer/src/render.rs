@@ -111,6 +111,10 @@ pub trait Observer: Sync {
     fn stop_requested(&self) -> bool {
         false
     }
+    /// Whether the frame may be gone on with later, to the same bytes: a limit of time then ends it between blocks only.
+    fn goes_on(&self) -> bool {
+        false
+    }
     /// Number of samples per pixel at which [`Self::look`] is to be called, even if a pass does not end there.
     fn next_look(&self) -> u64 {
         u64::MAX
@@ -583,7 +587,7 @@ impl<Q: Queries + Sync> Passes<'_, Q> {
     ) -> (u64, Option<Vec<Vec<PathRecord>>>) {
         let mut records = frame.filter.as_mut().map(FrameFilter::room).unwrap_or_default();
         let divisible = frame.filter.as_ref().is_none_or(FrameFilter::divisible);
-        let open = frame.filter.as_ref().is_none_or(FrameFilter::is_open);
+        let open = frame.filter.as_ref().is_none_or(|filter| filter.is_open() && !observer.goes_on());
         let mut next = pass.start;
         loop {
             let done = frame.samples.count();

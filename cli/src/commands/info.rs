@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use renderer::film::Film;
+use renderer::filtering::Filtering;
 use renderer::light::Selection;
 use renderer::render::{self, Job, Observer, RenderError};
 use renderer::scene::{Diagnostic, pbrt};
@@ -16,7 +17,7 @@ use crate::args::{InfoArguments, ReportFormat};
 use crate::exit::Failure;
 use crate::inventory::{Counts, Inventory, LENS};
 use crate::job;
-use crate::log::Log;
+use crate::log::{Level, Log};
 use crate::prices::{self, Price};
 use crate::sanitise;
 use crate::stats;
@@ -110,7 +111,9 @@ struct Memory {
     embree_bytes: u64,
     /// The film that a render of the whole frame would hold.
     film_bytes: u64,
-    /// What rendering will take at its peak: what building took, or what is left of it and the film.
+    /// What the adaptive filter takes besides, at least: its channels and one path of each pixel. Cells come to it.
+    filter_bytes: u64,
+    /// What rendering without a filter will take at its peak: what building took, or what is left of it and the film.
     total_bytes: Option<u64>,
 }
 
@@ -131,7 +134,7 @@ pub fn run(arguments: &InfoArguments, log: &Log) -> Result<(), Failure> {
     let prices = prices::of(&inventory.features);
     let report = Report { scene: &arguments.scene, inventory, prices, built, warnings };
     print(&match arguments.format {
-        ReportFormat::Text => text(&report),
+        ReportFormat::Text => text(&report, log.shows(Level::Verbose)),
         ReportFormat::Json => {
             let json = serde_json::to_string_pretty(&report).expect("the report is plain data with text keys");
             json + "\n"
@@ -154,9 +157,12 @@ fn build(arguments: &InfoArguments, lens: bool) -> Result<(Built, Vec<Diagnostic
     let threads = job::threads(arguments.threads, job::slurm().as_deref());
     let job = Job { scene: arguments.scene.clone(), threads, ..Job::default() };
     let observer = Warnings::default();
-    let prepared = render::thread_pool(threads)?.install(|| render::prepare(&job, &observer))?;
+    let mut prepared = render::thread_pool(threads)?.install(|| render::prepare(&job, &observer))?;
     let bounds = prepared.world.sensor.bounds;
     let film_bytes = Film::memory(bounds, &prepared.description.outputs(), false);
+    let plain = render::least_memory(&prepared);
+    prepared.description.filtering = Filtering::named("adaptive").expect("the filter of renders that name none");
+    let filter_bytes = render::least_memory(&prepared) - plain;
     let statistics = &prepared.statistics;
     let total_bytes = stats::resident_memory().zip(stats::peak_memory());
     let built = Built {
@@ -167,6 +173,7 @@ fn build(arguments: &InfoArguments, lens: bool) -> Result<(Built, Vec<Diagnostic
         memory: Memory {
             embree_bytes: statistics.embree_bytes,
             film_bytes,
+            filter_bytes,
             total_bytes: total_bytes.map(|(resident, peak)| peak.max(resident + film_bytes)),
         },
         follows: Follows::of(&prepared.world, lens),
@@ -175,7 +182,8 @@ fn build(arguments: &InfoArguments, lens: bool) -> Result<(Built, Vec<Diagnostic
 }
 
 /// The report for people. Names come from the scene, so each stays on its line.
-fn text(report: &Report<'_>) -> String {
+/// Verbose: with how costs were measured.
+fn text(report: &Report<'_>, verbose: bool) -> String {
     let inventory = &report.inventory;
     let mut text = String::new();
     let mut row = |name: &str, value: &str| {
@@ -199,14 +207,16 @@ fn text(report: &Report<'_>) -> String {
     }
     row("needs", &if inventory.features.is_empty() { "nothing special".into() } else { inventory.features.join(", ") });
     if !report.prices.is_empty() {
-        row(
-            "costs",
-            &format!(
-                "{}; features that are not used, at most {:.1} % each (instructions of a small room, ci/bench-features)",
-                prices::in_words(&report.prices),
-                prices::unused()
-            ),
-        );
+        row("costs", &format!("{} more work where they are seen", prices::in_words(&report.prices)));
+        if verbose {
+            let unused = prices::unused().max(0.0);
+            row(
+                "",
+                &format!(
+                    "measured by ci/bench-features in a small room; what is not used costs at most {unused:.2} % each"
+                ),
+            );
+        }
     }
     row("assets", &many(inventory.assets.len() as u64, "file"));
     if let Some(built) = &report.built {
@@ -228,12 +238,14 @@ fn text(report: &Report<'_>) -> String {
         row(
             "memory",
             &format!(
-                "{} in all, of which Embree {}, film {}, image textures {}, light tree {}",
+                "{} in all, of which Embree {}, film {}, image textures {}, light tree {}; the filter takes {} more at least, and \
+                 more with the samples",
                 built.memory.total_bytes.map_or("unknown".into(), megabytes),
                 megabytes(built.memory.embree_bytes),
                 megabytes(built.memory.film_bytes),
                 megabytes(follows.texture_bytes),
                 megabytes(follows.light_tree_bytes),
+                megabytes(built.memory.filter_bytes),
             ),
         );
     }

@@ -10,6 +10,7 @@ use crate::job;
 use crate::log::Log;
 use crate::output::OutputFile;
 use crate::picture::Picture;
+use crate::stats;
 use crate::study::page::escaped;
 use crate::study::picture::{data_url, gain};
 
@@ -18,11 +19,11 @@ pub fn run(arguments: &ReportArguments, log: &Log) -> Result<(), Failure> {
     job::require_extension(&arguments.output, "html", "reports are pages")?;
     let output = OutputFile::prepare(&arguments.output)?;
     let refused = |why: &dyn std::fmt::Display| Failure::Input(format!("{}: {why}", arguments.stats.display()));
-    let text = std::fs::read_to_string(&arguments.stats).map_err(|why| refused(&why))?;
-    let stats: Value = serde_json::from_str(&text).map_err(|why| refused(&why))?;
-    if stats["seconds"]["render"].as_f64().is_none() {
-        return Err(refused(&"these are not statistics as \"tessera render --stats\" writes them"));
-    }
+    let bytes = std::fs::read(&arguments.stats).map_err(|why| refused(&why))?;
+    let stats = serde_json::from_slice(&bytes).ok().filter(|stats: &Value| stats["seconds"]["render"].is_f64());
+    let Some(stats) = stats else {
+        return Err(refused(&"this is not a file of statistics, as \"tessera render --stats FILE.json\" writes one"));
+    };
     let picture = match find_picture(arguments, &stats) {
         Some(path) => Some(embedded(&path)?),
         None => {
@@ -65,7 +66,7 @@ fn page(stats: &Value, picture: Option<&str>) -> String {
     }
     html += &section("Time", "Seconds of wall-clock time.", &bars(&times(stats), |x| format!("{x:.2} s")));
     html += &section("Rays", "Queries of the geometry.", &bars(&rays(stats), |x| format!("{:.2} million", x / 1e6)));
-    html += &section("Memory", "Bytes at most.", &bars(&memory(stats), |x| format!("{:.1} MB", x / 1e6)));
+    html += &section("Memory", "Bytes at most.", &bars(&memory(stats), |x| stats::size(x as u64)));
     if let Some(probes) = stats["filter"]["probes"].as_array() {
         let named = |(k, count): (usize, &Value)| (format!("{} looked at", k + 1), count.as_f64().unwrap_or(0.0));
         let counts: Vec<_> = probes.iter().enumerate().map(named).collect();
@@ -76,8 +77,11 @@ fn page(stats: &Value, picture: Option<&str>) -> String {
         if let Some(values) = stats[name].as_object() {
             let rows = values.iter().filter(|(_, value)| !value.is_array() && !value.is_object());
             let row = |(key, value): (&String, &Value)| {
-                let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-                format!("<tr><td>{}</td><td>{}</td></tr>\n", escaped(&key.replace('_', " ")), escaped(&value))
+                format!(
+                    "<tr><td>{}</td><td>{}</td></tr>\n",
+                    escaped(&key.replace('_', " ")),
+                    escaped(&shown(key, value))
+                )
             };
             let rows: String = rows.map(row).collect();
             let title = name[..1].to_uppercase() + &name[1..];
@@ -85,6 +89,25 @@ fn page(stats: &Value, picture: Option<&str>) -> String {
         }
     }
     html + "</main>\n</body>\n</html>\n"
+}
+
+/// A figure with its unit, which its name tells.
+fn shown(key: &str, value: &Value) -> String {
+    match (key, value.as_f64()) {
+        ("bytes", Some(bytes)) => stats::size(bytes as u64),
+        ("seconds", Some(seconds)) => format!("{seconds:.2} s"),
+        ("share" | "occupancy" | "unresolved_share", Some(share)) => format!("{:.1} %", 100.0 * share),
+        (_, Some(_)) if value.is_u64() => grouped(value.as_u64().unwrap_or_default()),
+        (_, Some(number)) => stats::figure(number),
+        _ => value.as_str().map_or_else(|| value.to_string(), str::to_owned),
+    }
+}
+
+/// A count with its thousands apart.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let space = |at: usize| if at > 0 && (digits.len() - at) % 3 == 0 { "\u{202f}" } else { "" };
+    digits.char_indices().map(|(at, digit)| format!("{}{digit}", space(at))).collect()
 }
 
 fn header(stats: &Value, scene: &str) -> String {
@@ -168,6 +191,33 @@ fn bars(values: &[(String, f64)], label: impl Fn(f64) -> String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn figures_have_units_and_three_digits() {
+        for (key, value, text) in [
+            ("bytes", 26_279_150.into(), "26.3 MB"),
+            ("bytes", 1200.into(), "1.2 kB"),
+            ("share", 0.189_235_277.into(), "18.9 %"),
+            ("seconds", 2.345.into(), "2.35 s"),
+            ("cells", 1_234_567.into(), "1\u{202f}234\u{202f}567"),
+            ("cells", 123.into(), "123"),
+            ("name", Value::from("talk"), "talk"),
+        ] {
+            assert_eq!(shown(key, &value), text);
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_of_statistics_is_called_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let (stats, output) = (folder.path().join("a.exr"), folder.path().join("a.html"));
+        for content in [&b"\x76\x2f\x31\x01\xff"[..], b"{}", b"text"] {
+            std::fs::write(&stats, content).unwrap();
+            let arguments = ReportArguments { stats: stats.clone(), output: output.clone(), picture: None };
+            let failure = run(&arguments, &Log::new(crate::log::Level::Error)).unwrap_err();
+            assert!(failure.code() == 3 && failure.to_string().contains("not a file of statistics"), "{failure}");
+        }
+    }
 
     #[test]
     fn a_page_shows_all_phases_and_no_markup_of_others() {

@@ -16,6 +16,7 @@ fn a_scene_is_counted_and_weighed() {
     let memory = &report["memory"];
     assert!(memory["embree_bytes"].as_u64().unwrap() > 0);
     assert!(memory["film_bytes"].as_u64().unwrap() >= 48 * 32 * 8);
+    assert!(memory["filter_bytes"].as_u64().unwrap() > 48 * 32 * 32, "{memory}");
     assert!(memory["total_bytes"].as_u64() > memory["film_bytes"].as_u64());
     // A pinhole; a lamp and a sky that is the same all over, which BSDF samples find: the one light needs no choice.
     let follows = &report["follows"];
@@ -37,9 +38,14 @@ fn the_text_is_for_people() {
         "gaussian filter",
         "memory",
         "compiled without alpha tests",
+        "the filter takes",
+        "more work where they are seen",
     ] {
         assert!(text.contains(word), "no {word:?} in {text}");
     }
+    // How that was measured is for those who ask.
+    assert!(!text.contains("bench-features") && !text.contains('-'), "{text}");
+    assert!(bench.succeed(&["info", "scene.pbrt", "-v"]).stdout.contains("bench-features"));
 }
 
 #[test]

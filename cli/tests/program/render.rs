@@ -458,3 +458,19 @@ fn a_material_that_nobody_named_is_the_default() {
     let image = String::from_utf8_lossy(&bytes(&bench, "a.exr")).into_owned();
     assert!(image.contains("{\"default\":"), "no material \"default\" in the manifest");
 }
+
+#[test]
+fn all_layers_take_a_format_but_those_that_are_named_another() {
+    let bench = bench();
+    let job = ["render", "scene.pbrt", "-o", "a.exr", "--aov", "albedo,depth,CryptoObject"];
+    let size = |options: &[&str]| {
+        bench.succeed(&[&job[..], &["--compression", "none"], options].concat());
+        bytes(&bench, "a.exr").len()
+    };
+    let usual = size(&[]);
+    // Bytes of 48 x 32 pixels: three channels of albedo and one of depth in 2 for 4, four of rgba in 4 for 2.
+    let pixels = 48 * 32;
+    assert_eq!(usual - size(&["--half", "all"]), 2 * 4 * pixels);
+    assert_eq!(usual - size(&["--half", "all", "--float", "depth"]), 2 * 3 * pixels);
+    assert_eq!(size(&["--float", "all"]) - usual, 2 * 4 * pixels);
+}

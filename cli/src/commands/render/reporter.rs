@@ -130,6 +130,10 @@ impl Observer for Reporter<'_> {
         self.hindered() || self.goal_reached()
     }
 
+    fn goes_on(&self) -> bool {
+        self.checkpoints.wanted()
+    }
+
     fn next_look(&self) -> u64 {
         self.watch.as_ref().map_or(u64::MAX, Watch::next_look)
     }

@@ -36,6 +36,8 @@ mod world;
 
 use std::path::Path;
 
+pub use report::did_you_mean;
+
 use super::{Diagnostic, PathMap, Scene, Severity};
 
 /// The scene with the warnings about it.

@@ -88,7 +88,7 @@ pub(super) fn shown(text: &str) -> String {
 }
 
 /// `; did you mean “x”?` for the candidate that is closest to `name`, or nothing if none is close.
-pub(super) fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
     nearest(name, candidates).map_or_else(String::new, |best| format!("; did you mean \"{best}\"?"))
 }
 
