@@ -10,6 +10,8 @@ use renderer::scene::description::{
 };
 use serde::Serialize;
 
+use crate::stats;
+
 /// Counts by name, sorted by name.
 pub type Counts = BTreeMap<&'static str, u64>;
 
@@ -20,6 +22,7 @@ pub const LENS: &str = "depth of field";
 #[derive(Clone, Debug, Serialize)]
 pub struct Inventory {
     /// The files that its description was read from.
+    #[serde(serialize_with = "stats::shown_paths")]
     pub files: Vec<PathBuf>,
     /// The camera.
     pub camera: &'static str,
@@ -50,6 +53,7 @@ pub struct Inventory {
     /// What the renderer needs to be able to do.
     pub features: Vec<&'static str>,
     /// Image and mesh files.
+    #[serde(serialize_with = "stats::shown_paths")]
     pub assets: Vec<PathBuf>,
 }
 

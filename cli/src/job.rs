@@ -137,6 +137,16 @@ fn check_slice(arguments: &RenderArguments) -> Result<(), Failure> {
     Ok(())
 }
 
+/// The outputs that are named, with what "all" stands for besides.
+pub fn aovs(names: &[String]) -> AovSet {
+    let all = names.iter().any(|name| name == args::ALL);
+    let mut aovs = if all { AovSet::all() } else { AovSet::default() };
+    for name in names {
+        aovs.insert(name);
+    }
+    aovs
+}
+
 /// Makes sure that there is something to show in all channels.
 ///
 /// # Errors
@@ -325,6 +335,8 @@ pub fn check_encoding(encoding: &Encoding, aovs: AovSet) -> Result<(), Failure> 
 
 #[cfg(test)]
 mod tests {
+    use renderer::film::Aov;
+
     use super::*;
 
     #[test]
@@ -335,6 +347,15 @@ mod tests {
         for none in [None, Some(""), Some("0"), Some("-2"), Some("all")] {
             assert_eq!(threads(0, none), counted, "{none:?}");
         }
+    }
+
+    #[test]
+    fn what_is_named_beside_all_is_not_lost() {
+        let aovs = |names: &[&str]| aovs(&names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>());
+        for names in [["error", "all"], ["all", "error"]] {
+            assert!(aovs(&names).contains(Aov::Error) && aovs(&names).contains(Aov::Albedo), "{names:?}");
+        }
+        assert!(!aovs(&["all"]).contains(Aov::Error) && !aovs(&["error"]).contains(Aov::Albedo));
     }
 
     /// Vectors of the algorithm's authors.

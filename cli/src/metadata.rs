@@ -3,7 +3,7 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use oiio::Attribute;
-use renderer::error::Estimate;
+use renderer::error::{Estimate, Goal};
 use renderer::film::{Aov, cryptomatte};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Past, Samples};
@@ -80,6 +80,21 @@ pub fn identity(description: &FrameDescription, samples: &Samples) -> [(&'static
         ("tessera/sceneHash", Attribute::Text(format!("{:016x}", description.scene_hash))),
         ("tessera/settingsHash", Attribute::Text(format!("{:016x}", settings_hash(description)))),
     ]
+}
+
+/// The goal at which an image ended before all its samples were taken; `None` if there is no goal.
+pub fn reached(goal: &Goal) -> Option<(&'static str, Attribute)> {
+    let relmse = goal.relmse.map(|relmse| format!("relMSE {relmse}"));
+    let noise = goal.noise.map(|noise| format!("relativeNoise {noise}"));
+    let text = [relmse, noise].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    (!text.is_empty()).then(|| ("tessera/goal", Attribute::Text(text)))
+}
+
+/// Says that the image lacks no sample, as it reached its goal without.
+pub fn add_reached(attributes: &mut Vec<(String, Attribute)>, goal: &Goal) {
+    attributes.retain(|(name, _)| name != "tessera/complete");
+    attributes.push(("tessera/complete".into(), Attribute::Int(1)));
+    attributes.extend(reached(goal).map(|(name, value)| (name.to_owned(), value)));
 }
 
 /// Chromaticities of red, green, blue and white: ITU-R BT.709.

@@ -47,7 +47,7 @@ pub struct Comparison {
     pub z_test: Option<ZTest>,
     /// What the image's `error` layer says; `None` without one.
     pub predicted: Option<Prediction>,
-    /// Pixels that are not finite, in the image and in the reference.
+    /// Pixels that are not finite, in the image and in the reference or the second one.
     pub non_finite: [u64; 2],
 }
 
@@ -110,7 +110,10 @@ pub fn compare(image: &Picture, errors: Option<Errors<'_>>, reference: &Referenc
         flip_exposures: flip.exposures,
         z_test: significance::z_test(&pairs, image.width, noise),
         predicted: significance::predict(&pairs, noise, |r, c| scale(r[c], c)),
-        non_finite: [image, reference.picture].map(|p| p.pixels.iter().filter(|pixel| !finite(pixel)).count() as u64),
+        non_finite: [
+            image.pixels.iter().filter(|pixel| !finite(pixel)).count() as u64,
+            first.iter().zip(second).filter(|(a, b)| !(finite(a) && finite(b))).count() as u64,
+        ],
     }
 }
 
@@ -227,6 +230,13 @@ mod tests {
         let result = compare(&image, &reference);
         assert_eq!((result.non_finite, result.relmse), ([1, 0], 0.0));
         assert!(result.ssim.is_finite());
+    }
+
+    #[test]
+    fn a_second_reference_that_is_not_finite_is_counted() {
+        let (a, b) = (picture(4, 4, |_, _| [1.0; 3]), picture(4, 4, |x, _| [[f32::NAN, 1.0][x.min(1)]; 3]));
+        let reference = Reference { picture: &a, second: Some(&b), errors: None };
+        assert_eq!(super::compare(&a, None, &reference).non_finite, [0, 4]);
     }
 
     #[test]

@@ -30,6 +30,9 @@ impl OutputFile {
             Ok(_) => fs::canonicalize(path).map_err(|why| failure(&why))?,
             Err(_) => path.to_owned(),
         };
+        if target.to_str().is_none() {
+            return Err(failure(&"its name is not UTF-8, and the library that writes images takes no other"));
+        }
         match draft::prepare(&target) {
             Ok(()) => Ok(Self { target }),
             Err(why) if why.kind() == io::ErrorKind::NotFound => {

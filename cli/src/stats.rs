@@ -1,11 +1,11 @@
 //! What a render took, as a JSON file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use renderer::error::Estimate;
 use renderer::filtering::Report;
 use renderer::render::Statistics;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// The file of `--stats`. Keys are part of the program's interface: they may be added to, not renamed.
 #[derive(Clone, Debug, Serialize)]
@@ -13,12 +13,14 @@ pub struct Stats<'a> {
     /// Version of the program.
     pub version: &'static str,
     /// The scene file.
+    #[serde(serialize_with = "shown_path")]
     pub scene: &'a Path,
     /// The image.
+    #[serde(serialize_with = "shown_path")]
     pub output: &'a Path,
     /// Frame number.
     pub frame: i32,
-    /// Whether all samples were taken.
+    /// Whether all samples were taken, or a goal was reached without.
     pub complete: bool,
     /// Size of the whole frame.
     pub resolution: [u32; 2],
@@ -76,6 +78,16 @@ impl Error {
             100.0 * self.noise
         )
     }
+}
+
+/// A path in JSON, with marks for what is not UTF-8: a name of a file need not be.
+pub fn shown_path<P: AsRef<Path>, S: Serializer>(path: &P, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.as_ref().display())
+}
+
+/// Paths as by [`shown_path`].
+pub fn shown_paths<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }
 
 /// A number of bytes, as people read it.

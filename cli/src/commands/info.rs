@@ -25,6 +25,7 @@ use crate::stats;
 /// The answer.
 #[derive(Serialize)]
 struct Report<'a> {
+    #[serde(serialize_with = "stats::shown_path")]
     scene: &'a Path,
     #[serde(flatten)]
     inventory: Inventory,

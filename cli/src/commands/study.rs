@@ -8,6 +8,7 @@ use crate::job;
 use crate::log::Log;
 use crate::output::OutputFile;
 use crate::progress::Progress;
+use crate::stats;
 use crate::study::measure::{self, Measured, Point};
 use crate::study::page::{self, Study};
 use crate::study::plan::Plan;
@@ -24,6 +25,7 @@ pub fn run(arguments: &StudyArguments, log: &Log) -> Result<(), Failure> {
 #[derive(Serialize)]
 struct Report<'a> {
     version: String,
+    #[serde(serialize_with = "stats::shown_path")]
     scene: &'a std::path::Path,
     resolution: [usize; 2],
     reference_noise: f64,

@@ -1,5 +1,6 @@
 //! What a study renders.
 
+use renderer::film::MOST_TERMS;
 use renderer::filtering::Filtering;
 
 use crate::args::{FilterKind, StudyArguments};
@@ -52,13 +53,17 @@ impl Plan {
     /// What the command line asks for.
     ///
     /// # Errors
-    /// Settings that a filter does not take; two of one name.
+    /// Settings that a filter does not take; two of one name; more samples than a render takes.
     pub fn new(arguments: &StudyArguments) -> Result<Self, Failure> {
         let settings = settings(arguments)?;
         let mut budgets = arguments.spp.clone();
         budgets.sort_unstable();
         budgets.dedup();
         let largest = budgets.last().copied().unwrap_or(1);
+        let most = largest.max(arguments.reference_spp.unwrap_or(1));
+        if most > MOST_TERMS {
+            return Err(Failure::Usage(format!("{most} samples per pixel are more than a render takes: {MOST_TERMS}")));
+        }
         let mut renders = Vec::new();
         for &spp in &budgets {
             for seed in 1..=seeds(arguments.seeds, spp) {

@@ -180,6 +180,7 @@ impl<'a> Studio<'a> {
         let pool = render::thread_pool(job.threads).map_err(|error| job::scene_failure(&error, self.log))?;
         let prepared =
             pool.install(|| render::prepare(&job, &watch)).map_err(|error| job::scene_failure(&error, self.log))?;
+        render::check_memory(&prepared).map_err(|error| job::scene_failure(&error, self.log))?;
         let (start, clock) = (Instant::now(), stats::processor_seconds());
         let mut frame = pool.install(|| render::trace(prepared, None, None, &watch).develop());
         let spent = *watch.spent.lock().unwrap_or_else(PoisonError::into_inner);

@@ -56,6 +56,7 @@ fn frames_without_names_of_their_own_are_refused() {
     let render = ["render", "shot.####.pbrt", "--frames", "1-2", "-o"];
     bench.fail(&[&render[..], &["all.exr"]].concat(), 2, &["all.exr", "####"]);
     bench.fail(&[&render[..], &["a.#.exr", "--stats", "stats.json"]].concat(), 2, &["stats.json", "####"]);
+    bench.fail(&[&render[..], &["a.#.exr", "--checkpoint", "kept"]].concat(), 2, &["kept", "####"]);
     bench.fail(&[&render[..], &["a.#.exr", "--frame", "1"]].concat(), 2, &["--frame"]);
     bench.fail(&["merge", "a.#.part", "-o", "a.exr", "--frames", "1-2"], 2, &["a.exr", "####"]);
     bench.fail(&["render", "shot.####.pbrt", "-o", "a.exr", "--frames", "1-"], 2, &["\"1-\"", "1-10x2"]);
@@ -83,6 +84,26 @@ fn what_is_there_is_skipped_only_if_it_is_what_was_asked_for() {
         assert!(run.stderr.contains("nothing to do") && run.stdout.ends_with("Finished Rendering\n"), "{}", run.stderr);
         let run = bench.succeed(&[&job[..], &["--seed", "5"]].concat());
         assert!(!run.stderr.contains("nothing to do") && bytes(&bench, name) != first, "{name}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn what_reached_its_goal_is_complete_for_that_goal() {
+    let bench = bench();
+    let job = ["render", "shot.0001.pbrt", "-o", "a.exr", "--spp", "4096", "--skip-existing", "--stats", "a.json"];
+    let with = |goal: &[&'static str]| bench.succeed(&[&job[..], goal].concat()).stderr;
+    let loose = ["--target-error", "1000"];
+    assert!(with(&loose).contains("good enough"));
+    let stats: serde_json::Value = serde_json::from_slice(&bytes(&bench, "a.json")).unwrap();
+    assert_eq!(stats["complete"], true);
+    assert!(with(&loose).contains("nothing to do"));
+    for other in [&["--target-error", "900"][..], &["--target-error", "1000", "--noise-threshold", "100"]] {
+        assert!(!with(other).contains("nothing to do"), "{other:?}");
+    }
+    // What a limit of time ended is not complete, with a goal or without.
+    for goal in [&[][..], &["--target-error", "1e-9"]] {
+        let limited = [goal, &["--time-limit", "0.000001s"]].concat();
+        assert!(!with(&limited).contains("nothing to do") && !with(&limited).contains("nothing to do"), "{goal:?}");
     }
 }
 

@@ -92,6 +92,16 @@ fn what_cannot_be_studied_is_refused_before_anything_is_rendered() {
     bench.fail(&with(&["--variant", "none=adaptive"]), 2, &["none", "--variant"]);
     bench.fail(&with(&["--variant", "fine=adaptive,leef=2"]), 2, &["leef"]);
     bench.fail(&with(&["--reference", "a.exr"]), 2, &["two images"]);
+    bench.fail(&with(&["--spp", "18446744073709551615"]), 2, &["18446744073709551615", "8388608"]);
+    bench.fail(&with(&["--reference-spp", "8388609"]), 2, &["8388609"]);
     assert_eq!(bench.files(), ["scene.pbrt"]);
     bench.fail(&["study", "absent.pbrt", "-o", "out"], 3, &["absent.pbrt"]);
+    // More than any machine has.
+    bench.write(
+        "large.pbrt",
+        &SCENE
+            .replace("xresolution\" 48", "xresolution\" 1000000")
+            .replace("yresolution\" 32", "yresolution\" 1000000"),
+    );
+    bench.fail(&["study", "large.pbrt", "-o", "out", "--spp", "1"], 1, &["more than there is memory"]);
 }

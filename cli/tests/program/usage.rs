@@ -67,6 +67,27 @@ fn outputs_are_checked_before_anything_is_read() {
     assert_eq!(bench.files(), ["file"]);
 }
 
+/// Linux takes any bytes.
+#[test]
+fn paths_that_are_no_text_are_read_and_refused_as_images() {
+    use std::os::unix::ffi::OsStrExt;
+    let bench = Bench::new();
+    let at = |bytes: &[u8]| bench.path("").join(std::ffi::OsStr::from_bytes(bytes));
+    std::fs::write(at(b"b\xff.pbrt"), super::SCENE).unwrap();
+    let run = |words: &[&str], path: &[u8], more: &[&str]| {
+        super::Run::of(bench.command(words).arg(at(path)).args(more).output().unwrap())
+    };
+    let output = ["-o", "a.exr", "--spp", "1", "--stats", "a.json"];
+    let rendered = run(&["render"], b"b\xff.pbrt", &output);
+    assert_eq!(rendered.code, 0, "{}", rendered.stderr);
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(bench.path("a.json")).unwrap()).unwrap();
+    assert!(stats["scene"].as_str().unwrap().ends_with("b\u{fffd}.pbrt"), "{stats}");
+    let info = run(&["info", "--format", "json"], b"b\xff.pbrt", &[]).json();
+    assert!(info["files"][0].as_str().unwrap().ends_with("b\u{fffd}.pbrt"), "{info}");
+    let refused = run(&["render", "none.pbrt", "-o"], b"b\xff.exr", &[]);
+    assert!(refused.code == 4 && refused.stderr.contains("UTF-8"), "{}", refused.stderr);
+}
+
 #[test]
 fn a_missing_input_exits_with_3_and_names_it() {
     let bench = Bench::new();

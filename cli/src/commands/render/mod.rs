@@ -8,10 +8,11 @@ use std::path::Path;
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 
+use oiio::Attribute;
 use rayon::ThreadPool;
 use renderer::error::{Goal, Watch};
+use renderer::film::Aov;
 use renderer::film::exr::{self, Losses};
-use renderer::film::{Aov, AovSet};
 use renderer::filtering::Filtering;
 use renderer::frame::{Accumulation, FrameDescription, Past, Samples};
 use renderer::part::{self, Part};
@@ -48,7 +49,8 @@ fn sequence(
     progress: &Progress<'_>,
 ) -> Result<(), Failure> {
     if let Some(frames) = &arguments.frames {
-        let outputs = iter::once(&arguments.output).chain(&arguments.channels.stats);
+        let outputs =
+            iter::once(&arguments.output).chain(&arguments.channels.stats).chain(&arguments.checkpoint.checkpoint);
         outputs.into_iter().try_for_each(|output| job::distinct(output, frames.numbers()))?;
         job::check_scenes(&arguments.scene, frames.numbers())?;
     } else if arguments.frame.is_none() {
@@ -130,7 +132,7 @@ fn render(
     let pool = render::thread_pool(job.threads).map_err(|error| reporter.failure(error))?;
     let prepared = pool.install(|| render::prepare(&job, &reporter)).map_err(|error| reporter.failure(error))?;
     job::check_encoding(&encoding, prepared.description.aovs)?;
-    if arguments.checkpoint.skip_existing && is_complete(&path, &prepared.description) {
+    if arguments.checkpoint.skip_existing && is_complete(&path, &prepared.description, &goal(arguments)) {
         log.info(&format!("{} is there and complete: nothing to do", path.display()));
         progress.finish(&path, stats::peak_memory());
         return Ok(None);
@@ -152,7 +154,7 @@ fn render(
     let mut written = if job::is_part(&path) {
         write_part(traced, &pool, &output)?
     } else {
-        write_image(traced, &pool, &reporter, arguments.channels.provenance)?
+        write_image(traced, &pool, &reporter, &goal(arguments), arguments.channels.provenance)?
     };
     let past = written.frame.past.take();
     let outcome = Outcome { path: &path, written, begin };
@@ -189,6 +191,7 @@ fn write_image(
     traced: Traced,
     pool: &ThreadPool,
     reporter: &Reporter<'_>,
+    goal: &Goal,
     provenance: bool,
 ) -> Result<Written, Failure> {
     // The renderer allows OpenImageIO no threads beside its own; the file at the end may have all.
@@ -202,6 +205,9 @@ fn write_image(
     let provenance = provenance.then_some(&frame.statistics);
     let mut attributes = metadata::of_frame(&frame.description, &frame.samples, error.as_ref(), provenance);
     attributes.extend(frame.past.as_ref().map(metadata::of_past));
+    if reporter.goal_reached() && !frame.complete() {
+        metadata::add_reached(&mut attributes, goal);
+    }
     let losses = exr::write_as(&frame.film, attributes, reporter.encoding, reporter.output.target())
         .map_err(|error| Failure::Output(error.to_string()))?;
     Ok(Written { frame, losses, error, seconds: start.elapsed().as_secs_f64() })
@@ -221,28 +227,25 @@ fn apart(output: &OutputFile, checkpoint: Option<&OutputFile>, statistics: Optio
     Ok(())
 }
 
-/// Whether there is an image or a part of this very frame that lacks no sample of those that are asked for.
-fn is_complete(path: &Path, description: &FrameDescription) -> bool {
+/// Whether there is an image or a part of this very frame that lacks no sample of those that are asked for, or an image that
+/// was good enough without.
+fn is_complete(path: &Path, description: &FrameDescription, goal: &Goal) -> bool {
     let samples = Samples::from(description.asked.clone());
     if job::is_part(path) {
         return Part::open(path)
             .is_ok_and(|part| part.samples == samples && description.difference(&part.description).is_none());
     }
+    let [range, others @ ..] = metadata::identity(description, &samples);
+    let has = |image: &oiio::Image, (name, value): &(&str, Attribute)| image.attribute(name) == Some(value);
+    let enough = metadata::reached(goal);
     let same = |image: oiio::Image| {
-        metadata::identity(description, &samples).iter().all(|(name, value)| image.attribute(name) == Some(value))
+        others.iter().all(|other| has(&image, other))
+            && (has(&image, &range) || enough.as_ref().is_some_and(|enough| has(&image, enough)))
     };
     oiio::read(path).is_ok_and(same)
 }
 
 fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
-    let mut aovs = AovSet::default();
-    for name in &arguments.channels.aov {
-        if name == "all" {
-            aovs = AovSet::all();
-        } else {
-            aovs.insert(name);
-        }
-    }
     Job {
         scene: arguments.scene.clone(),
         path_map: arguments.paths.map(),
@@ -257,17 +260,22 @@ fn job(arguments: &RenderArguments, filtering: Filtering) -> Job {
         sample_range: arguments.quality.sample_range.clone(),
         slice: arguments.quality.slice,
         threads: job::threads(arguments.run.threads, job::slurm().as_deref()),
-        aovs,
+        aovs: job::aovs(&arguments.channels.aov),
         time_limit: arguments.quality.time_limit,
         filtering,
         ..Job::default()
     }
 }
 
+/// When the frame is good enough.
+fn goal(arguments: &RenderArguments) -> Goal {
+    Goal { relmse: arguments.quality.target_error, noise: arguments.quality.noise_threshold }
+}
+
 /// Who looks at the frame's error. It costs nothing but where there is a filter, which then is evaluated when the number of
 /// samples doubles: only if somebody asks.
 fn watch(arguments: &RenderArguments, job: &Job) -> Option<Watch> {
-    let goal = Goal { relmse: arguments.quality.target_error, noise: arguments.quality.noise_threshold };
+    let goal = goal(arguments);
     let asked = job.aovs.contains(Aov::Error) || goal != Goal::default();
     (asked || job.filtering == Filtering::None).then(|| Watch::new(goal))
 }

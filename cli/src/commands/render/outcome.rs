@@ -52,7 +52,7 @@ impl<'a> Outcome<'a> {
             scene: &arguments.scene,
             output: self.path,
             frame: description.number,
-            complete: frame.complete(),
+            complete: frame.complete() || reporter.goal_reached(),
             resolution: film.resolution(),
             pixel_bounds: [x0, x1, y0, y1],
             samples: metadata::span(&frame.samples),
