@@ -1,7 +1,8 @@
 //! The command line as it was typed. What it means is [`crate::job`]'s.
 
+use std::iter;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -57,6 +58,26 @@ pub enum Command {
     Report(ReportArguments),
     /// Measure what time buys: a scene over budgets and settings, as one page
     Study(StudyArguments),
+}
+
+impl Command {
+    /// The files that it reads, by their names on the command line.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let files = match self {
+            Self::Render(arguments) => vec![&arguments.scene],
+            Self::Info(arguments) => vec![&arguments.scene],
+            Self::Merge(arguments) => arguments.parts.iter().collect(),
+            Self::Farm(_) => Vec::new(),
+            Self::Compare(CompareArguments { image, reference, second_reference, .. }) => {
+                [image, reference].into_iter().chain(second_reference).collect()
+            }
+            Self::Denoise(arguments) => vec![&arguments.image],
+            Self::Preview(arguments) => vec![&arguments.image],
+            Self::Report(arguments) => vec![&arguments.stats],
+            Self::Study(arguments) => iter::once(&arguments.scene).chain(&arguments.reference).collect(),
+        };
+        files.into_iter().map(PathBuf::as_path)
+    }
 }
 
 /// Options of every command.
@@ -552,14 +573,20 @@ impl FromStr for Resolution {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || "expected width x height in pixels, such as 1280x720".to_owned();
         let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
-        let size = [width, height].map(|side| side.trim().parse().ok().filter(|&side| side > 0));
+        let size = [width, height].map(|side| side.trim().parse().ok().filter(|&side: &u32| side > 0));
         let [Some(width), Some(height)] = size else { return Err(wrong()) };
+        if width.max(height) > LONGEST_SIDE {
+            return Err(format!("{width}x{height} is longer than an image file can be: {LONGEST_SIDE} pixels a side"));
+        }
         if u64::from(width) * u64::from(height) > i32::MAX as u64 {
             return Err(format!("{width}x{height} has more pixels than an image file holds"));
         }
         Ok(Self([width, height]))
     }
 }
+
+/// What OpenImageIO writes as OpenEXR at most, pixels.
+const LONGEST_SIDE: u32 = 1 << 20;
 
 /// Layers whose format may be chosen, all of them by [`ALL`]; ids take 32 bits.
 fn layer_names(mattes: bool) -> PossibleValuesParser {
@@ -701,7 +728,8 @@ mod tests {
     #[test]
     fn resolutions_ranges_and_windows_are_checked() {
         assert_eq!("640x360".parse(), Ok(Resolution([640, 360])));
-        for bad in ["640", "0x9", "640x", "x", "-1x2", "1.5x2", "99999x99999", "640x360x2"] {
+        assert_eq!("1048576x1".parse(), Ok(Resolution([1 << 20, 1])));
+        for bad in ["640", "0x9", "640x", "x", "-1x2", "1.5x2", "99999x99999", "640x360x2", "1048577x1", "1x1048577"] {
             assert!(bad.parse::<Resolution>().is_err(), "{bad}");
         }
         assert_eq!(sample_range("16:48"), Ok(16..48));

@@ -36,6 +36,8 @@ struct State {
     last: Instant,
     /// Passes since then.
     passes: u64,
+    /// Whether the file holds samples of this frame.
+    stored: bool,
     publishing: Option<Publishing>,
 }
 
@@ -57,7 +59,7 @@ impl<'a> Checkpoints<'a> {
                 return Err(Failure::Input(format!("{why}; give --checkpoint a file of its own")));
             }
         }
-        let state = Mutex::new(State { last: Instant::now(), passes: 0, publishing: None });
+        let state = Mutex::new(State { last: Instant::now(), passes: 0, stored: false, publishing: None });
         Ok(Self { path, interval: arguments.checkpoint_interval, resume: arguments.resume, log, state })
     }
 
@@ -78,6 +80,7 @@ impl<'a> Checkpoints<'a> {
         }
         match stored(path, description) {
             Ok(frame) => {
+                self.state().stored = true;
                 self.log.info(&format!("going on from {}: samples {} are there", path.display(), frame.samples));
                 Ok(Some(frame))
             }
@@ -141,11 +144,14 @@ impl<'a> Checkpoints<'a> {
         let Some(Publishing { what, thread }) = self.state().publishing.take() else { return };
         // A thread that only waits for the system does not panic.
         match thread.join() {
-            Ok((Ok(bytes), time)) => self.log.verbose(&format!(
-                "{what}: {:.1} MB, on the disk {:.2} s later",
-                bytes as f64 / 1e6,
-                time.as_secs_f64()
-            )),
+            Ok((Ok(bytes), time)) => {
+                self.state().stored = true;
+                self.log.verbose(&format!(
+                    "{what}: {:.1} MB, on the disk {:.2} s later",
+                    bytes as f64 / 1e6,
+                    time.as_secs_f64()
+                ));
+            }
             Ok((Err(why), _)) => self.failed(&why),
             Err(_) => self.log.warning(&format!("{what}: lost on its way to the disk; the render goes on")),
         }
@@ -162,6 +168,12 @@ impl<'a> Checkpoints<'a> {
     /// Whether there are any.
     pub fn wanted(&self) -> bool {
         self.path.is_some()
+    }
+
+    /// Whether the same command will find samples of this frame.
+    pub fn kept(&self) -> bool {
+        self.wait();
+        self.resume != Resume::Never && self.state().stored
     }
 
     /// The picture is there: what was stored on the way to it is of no use any more.

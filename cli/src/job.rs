@@ -248,6 +248,7 @@ pub fn scene_failure(error: &RenderError, log: &Log) -> Failure {
         | RenderError::OpenImageIo(_)
         | RenderError::Threads { .. }
         | RenderError::Memory { .. }
+        | RenderError::EmptyWindow { .. }
         | RenderError::EmptySampleRange(_)
         | RenderError::TooManySamples(_)
         | RenderError::Slice { .. }

@@ -87,7 +87,7 @@ pub fn reached(goal: &Goal) -> Option<(&'static str, Attribute)> {
     let relmse = goal.relmse.map(|relmse| format!("relMSE {relmse}"));
     let noise = goal.noise.map(|noise| format!("relativeNoise {noise}"));
     let text = [relmse, noise].into_iter().flatten().collect::<Vec<_>>().join(" ");
-    (!text.is_empty()).then(|| ("tessera/goal", Attribute::Text(text)))
+    (!text.is_empty()).then_some(("tessera/goal", Attribute::Text(text)))
 }
 
 /// Says that the image lacks no sample, as it reached its goal without.

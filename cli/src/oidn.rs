@@ -40,7 +40,9 @@ impl Oidn {
             None => std::env::split_paths(&path).map(|folder| folder.join(PROGRAM)).find(|program| program.is_file()),
         };
         let wanted = named.map_or_else(|| format!("no {PROGRAM} on the PATH"), |path| format!("no {}", path.display()));
-        found.map(|program| Self { program }).ok_or_else(|| {
+        // A name without a folder would be looked for on the PATH when it is run.
+        let absolute = |program| std::path::absolute(&program).unwrap_or(program);
+        found.map(|program| Self { program: absolute(program) }).ok_or_else(|| {
             Failure::Input(format!(
                 "Intel Open Image Denoise is not there: {wanted}. Its releases and the Python package pyoidn carry the program \
                  {PROGRAM}; name it with --oidn FILE or in OIDN_DENOISE"

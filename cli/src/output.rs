@@ -48,6 +48,14 @@ impl OutputFile {
         &self.target
     }
 
+    /// Makes sure that no input is written over.
+    ///
+    /// # Errors
+    /// One of them is this file.
+    pub fn spare<'a>(&self, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+        inputs.into_iter().try_for_each(|input| spare(&self.target, input))
+    }
+
     /// Whether another path leads to the same place.
     pub fn is(&self, other: &Self) -> bool {
         let place = |target: &Path| {
@@ -86,6 +94,19 @@ impl OutputFile {
     fn failure(&self, why: &dyn std::fmt::Display) -> Failure {
         Failure::Output(format!("cannot write \"{}\": {why}", self.target.display()))
     }
+}
+
+/// Makes sure that an input is not written over.
+///
+/// # Errors
+/// It is the file that is to be written.
+pub fn spare(output: &Path, input: &Path) -> Result<(), Failure> {
+    let real = |path| fs::canonicalize(path).ok();
+    if real(output).is_some_and(|output| Some(output) == real(input)) {
+        let text = format!("\"{}\" is read and cannot be written over: name another file to write", input.display());
+        return Err(Failure::Usage(text));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

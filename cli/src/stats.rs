@@ -80,6 +80,18 @@ impl Error {
     }
 }
 
+/// A count with its noun.
+pub fn many(count: u64, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
+}
+
+/// What to say of samples that were rejected, of so many camera rays.
+pub fn rejected(samples: u64, camera_rays: u64) -> Option<String> {
+    let share = 100.0 * samples as f64 / camera_rays.max(1) as f64;
+    let samples = (samples > 0).then(|| many(samples, "sample was", "samples were"))?;
+    Some(format!("{samples} ({share:.2e} %) not finite or negative, which counts as black"))
+}
+
 /// A path in JSON, with marks for what is not UTF-8: a name of a file need not be.
 pub fn shown_path<P: AsRef<Path>, S: Serializer>(path: &P, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(&path.as_ref().display())
@@ -316,6 +328,13 @@ fn parse_status(text: &str, key: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rejected_samples_are_told_with_their_share() {
+        assert_eq!(rejected(0, 100), None);
+        assert!(rejected(1, 100).unwrap().starts_with("1 sample was (1.00e0 %) not finite"));
+        assert!(rejected(3, 0).unwrap().starts_with("3 samples were"));
+    }
 
     #[test]
     fn memory_is_read_from_the_status_file() {

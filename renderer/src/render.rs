@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use filter::{Anchor, PathRecord};
 use rayon::prelude::*;
 
+use crate::camera::rendered_pixels;
 use crate::compile::names::Names;
 use crate::compile::{self, CompileError};
 use crate::film::cryptomatte::id;
@@ -152,6 +153,14 @@ pub enum RenderError {
         threads: usize,
         /// What the system says.
         why: rayon::ThreadPoolBuildError,
+    },
+    /// No pixels to render.
+    #[error("{option} leaves no pixel of the frame of {} x {} pixels to render", size[0], size[1])]
+    EmptyWindow {
+        /// What was asked for.
+        option: &'static str,
+        /// The frame, in pixels.
+        size: [u32; 2],
     },
     /// Nothing to do.
     #[error("the sample range {}:{} is empty; the first number must be less than the second", .0.start, .0.end)]
@@ -390,6 +399,7 @@ fn described(
         scene::pbrt::load_mapped(&job.scene, &job.path_map).map_err(RenderError::Scene)?;
     warnings.iter().for_each(|warning| observer.warning(warning));
     apply(job, &mut description);
+    check_window(job, &description.film)?;
     statistics.parse_seconds = start.elapsed().as_secs_f64();
     Ok(description)
 }
@@ -862,6 +872,19 @@ fn apply(job: &Job, description: &mut scene::Scene) {
     }
     if let Some(bounds) = job.pixel_bounds {
         description.film.pixel_bounds = Some(bounds);
+    }
+}
+
+/// Makes sure that a window which the job gives, not the scene, holds pixels.
+fn check_window(job: &Job, film: &scene::description::Film) -> Result<(), RenderError> {
+    let option = match (job.pixel_bounds, job.crop) {
+        (Some(_), _) => "--pixel-bounds",
+        (None, Some(_)) => "--crop",
+        (None, None) => return Ok(()),
+    };
+    match rendered_pixels(film.resolution, film.overscan, film.crop_window, film.pixel_bounds) {
+        Some(_) => Ok(()),
+        None => Err(RenderError::EmptyWindow { option, size: film.resolution }),
     }
 }
 

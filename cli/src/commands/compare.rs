@@ -1,6 +1,6 @@
 //! `tessera compare`: how far an image is from a reference.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use oiio::{Channel, Format};
 
@@ -23,6 +23,8 @@ pub fn run(arguments: &CompareArguments, log: &Log) -> Result<(), Failure> {
             Some(OutputFile::prepare(path)?)
         }
     };
+    let inputs = [Some(&arguments.image), Some(&arguments.reference), arguments.second_reference.as_ref()];
+    output.iter().try_for_each(|output| output.spare(inputs.into_iter().flatten().map(PathBuf::as_path)))?;
     let layer = arguments.layer.as_deref();
     let image = Picture::read(&arguments.image, layer)?;
     let reference = Picture::read(&arguments.reference, layer)?;

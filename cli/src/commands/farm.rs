@@ -9,12 +9,15 @@ mod slurm;
 use std::ffi::OsStr;
 use std::path::Path;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use renderer::filtering::Filtering;
 use renderer::render::Slice;
 use renderer::{part, scene};
 
-use crate::args::{Arguments, Command, FarmArguments, FarmEngine, RenderArguments, SequenceArguments};
+use crate::args::{
+    Arguments, Command, CompressionKind, EncodingArguments, FarmArguments, FarmEngine, RenderArguments,
+    SequenceArguments,
+};
 use crate::exit::Failure;
 use crate::job;
 use crate::log::Log;
@@ -37,6 +40,8 @@ struct Sequence<'a> {
     name: String,
     scene: Place<'a>,
     output: Place<'a>,
+    /// How the images are stored, as options of a merge.
+    encoding: Vec<String>,
 }
 
 /// Where a file is.
@@ -68,9 +73,16 @@ impl<'a> Sequence<'a> {
         let name = arguments.name.as_deref().unwrap_or(if stem.is_empty() { "tessera" } else { stem });
         // Both engines make file names of it.
         let harmless = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
-        let name = name.trim_start_matches('-').chars().map(harmless).take(100).collect();
-        let sequence = Self { arguments, name, scene, output };
-        sequence.check(log)?;
+        let name: String = name.trim_start_matches('-').chars().map(harmless).take(100).collect();
+        if name.is_empty() {
+            return Err(Failure::Usage(
+                "--name: nothing of it is left for a file's name; use letters or digits".into(),
+            ));
+        }
+        let mut sequence = Self { arguments, name, scene, output, encoding: Vec::new() };
+        let render = sequence.parse()?;
+        sequence.check(&render, log)?;
+        sequence.encoding = encoding(&render.channels.encoding);
         Ok(sequence)
     }
 
@@ -105,6 +117,7 @@ impl<'a> Sequence<'a> {
     /// The words after the program's name that merge frames.
     fn merge(&self, parts: &str, frames: &str, output: &str) -> Vec<String> {
         let mut words: Vec<_> = ["merge", "--frames", frames, "-o", output].map(str::to_owned).into();
+        words.extend_from_slice(&self.encoding);
         words.extend((0..self.arguments.slices).map(|slice| self.part(parts, &slice.to_string())));
         words
     }
@@ -114,8 +127,7 @@ impl<'a> Sequence<'a> {
     }
 
     /// Makes sure before anything is handed out that renders take the options and parts can be merged.
-    fn check(&self, log: &Log) -> Result<(), Failure> {
-        let render = self.parse()?;
+    fn check(&self, render: &RenderArguments, log: &Log) -> Result<(), Failure> {
         let refuse = |option, why| Err(Failure::Usage(format!("{option} cannot be given to slices: {why}")));
         let quality = &render.quality;
         for (given, option) in [
@@ -130,11 +142,12 @@ impl<'a> Sequence<'a> {
         if render.channels.stats.is_some() {
             return refuse("--stats", "all slices of a frame would write the same file");
         }
-        job::check_outputs(&render)?;
+        job::check_outputs(render)?;
+        job::check_encoding(&job::encoding(&render.channels.encoding), job::aovs(&render.channels.aov))?;
         let filtering = job::filtering(&render.filter, false)?;
         part::storable(&filtering).map_err(|why| Failure::Usage(why.to_string()))?;
-        job::check_sequence(&render, &filtering)?;
-        self.check_slices(&render, &filtering, log)
+        job::check_sequence(render, &filtering)?;
+        self.check_slices(render, &filtering, log)
     }
 
     /// What the command line of a render comes to.
@@ -182,6 +195,20 @@ impl<'a> Sequence<'a> {
         let (scene, _) = scene::pbrt::load_mapped(&scene, &render.paths.map()).ok()?;
         Some(scene.spp.max(1))
     }
+}
+
+/// How images are stored, in words of the command line: it is the merge that writes them.
+fn encoding(arguments: &EncodingArguments) -> Vec<String> {
+    let compression = arguments.compression.to_possible_value().expect("every kind has a name");
+    let words = [
+        ("--compression", vec![compression.get_name().to_owned()]),
+        ("--half", arguments.half.clone()),
+        ("--float", arguments.float.clone()),
+    ];
+    let given = words.into_iter().filter(|(option, names)| {
+        !names.is_empty() && (*option != "--compression" || arguments.compression != CompressionKind::default())
+    });
+    given.flat_map(|(option, names)| [option.to_owned(), names.join(",")]).collect()
 }
 
 /// What to say where slices are not nearly alike, so that machines wait for others.
@@ -272,6 +299,19 @@ mod tests {
     }
 
     #[test]
+    fn images_are_stored_by_the_merge_as_asked_for() {
+        let base = ["openjd", "a.pbrt", "-o", "a.####.exr", "--frames", "1-2", "--", "--spp", "8"];
+        let merge = |options: &[&str]| {
+            let FarmEngine::Openjd(arguments) = parsed(&[&base, options].concat()).engine else { panic!("not openjd") };
+            let words = Sequence::new(&arguments.sequence, &QUIET()).ok().unwrap().merge("parts", "1", "a.exr");
+            words.join(" ")
+        };
+        let found = merge(&["--compression", "piz", "--half", "albedo,N", "--float", "rgba", "--aov", "albedo,N"]);
+        assert!(found.contains(" a.exr --compression piz --half albedo,N --float rgba parts/"), "{found}");
+        assert!(!merge(&[]).contains("--compression") && !merge(&[]).contains("--half"));
+    }
+
+    #[test]
     fn what_no_farm_could_render_is_refused_before_it_is_handed_out() {
         let base = ["openjd", "a.pbrt", "-o", "a.####.exr", "--frames", "1-2", "--"];
         for (options, words) in [
@@ -286,6 +326,7 @@ mod tests {
             (&["--filter", "talk", "--temporal", "0.8"], &["talk", "parts"]),
             (&["--aov", "motion"], &["motion"]),
             (&["--stats", "a.json"], &["--stats"]),
+            (&["--compression", "dwaa", "--aov", "CryptoObject"], &["dwaa"]),
             (&["-o", "b.exr"], &["--output"]),
         ] {
             let refusal = refusal(&[&base, options].concat());
@@ -296,6 +337,7 @@ mod tests {
         assert!(sliced("4", &["--spp", "8"]).contains("epoch=2"));
         assert!(sliced("9", &["--spp", "8", "--filter", "none"]).contains("at most 8"));
         assert!(refusal(&["openjd", "a.pbrt", "-o", "a.exr", "--frames", "1-2"]).contains("####"));
+        assert!(refusal(&["openjd", "a.pbrt", "-o", "a.exr", "--frames", "1", "--name", "-"]).contains("--name"));
         assert!(refusal(&["openjd", "a.pbrt", "-o", "a.png", "--frames", "1"]).contains(".exr"));
         assert!(refusal(&["openjd", "a\nb.pbrt", "-o", "a.exr", "--frames", "1"]).contains("rename"));
     }

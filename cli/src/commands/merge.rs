@@ -7,6 +7,7 @@ use renderer::error::{Goal, Watch};
 use renderer::film::{Aov, exr};
 use renderer::filtering::Filtering;
 use renderer::frame::FrameDescription;
+use renderer::integrator::Counters;
 use renderer::part::{Merged, Part, PartError, Parts};
 use renderer::render::{Frame, Statistics, Traced};
 
@@ -84,6 +85,10 @@ fn develop(
         )));
     }
     let sums = pool.install(|| add_up(parts)).map_err(failure)?;
+    let Counters { rejected_samples, camera_rays, .. } = sums.counters();
+    if let Some(rejected) = stats::rejected(rejected_samples, camera_rays) {
+        log.warning(&rejected);
+    }
     if let Err(error) = oiio::set_threads(pool.current_num_threads()) {
         log.verbose(&format!("{error}; its default stays"));
     }
@@ -114,6 +119,16 @@ enum Sums {
     Image(Box<Merged>),
     /// All sums, and who has looked at their error.
     Frame(Box<Frame>, Watch),
+}
+
+impl Sums {
+    /// Rays, and samples that were rejected.
+    fn counters(&self) -> Counters {
+        match self {
+            Self::Image(merged) => merged.counters,
+            Self::Frame(frame, _) => frame.statistics.counters,
+        }
+    }
 }
 
 /// Adds parts up. Without a filter the sums tell the error as they do in a render of the whole; with one the frame is

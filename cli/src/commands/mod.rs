@@ -15,6 +15,7 @@ use std::io::{self, Write};
 use crate::args::{Arguments, Command};
 use crate::exit::Failure;
 use crate::log::{Level, Log};
+use crate::output;
 
 /// Does what the command line says.
 ///
@@ -27,7 +28,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         (false, false) => Level::Info,
     };
     let mut log = Log::new(shown);
-    let result = log.open_file(arguments.log.log_file.as_deref()).and_then(|()| match &arguments.command {
+    let log_file = arguments.log.log_file.as_deref();
+    let spared = || {
+        log_file
+            .map_or(Ok(()), |log_file| arguments.command.inputs().try_for_each(|input| output::spare(log_file, input)))
+    };
+    let result = spared().and_then(|()| log.open_file(log_file)).and_then(|()| match &arguments.command {
         Command::Render(arguments) => render::run(arguments, &log),
         Command::Info(arguments) => info::run(arguments, &log),
         Command::Merge(arguments) => merge::run(arguments, &log),

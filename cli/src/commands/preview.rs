@@ -48,6 +48,7 @@ impl Data {
 pub fn run(arguments: &PreviewArguments, log: &Log) -> Result<(), Failure> {
     job::require_extension(&arguments.output, "png", "previews are written as PNG")?;
     let output = OutputFile::prepare(&arguments.output)?;
+    output.spare([&*arguments.image])?;
     let picture = Picture::read(&arguments.image, arguments.layer.as_deref())?;
     let layer = arguments.layer.as_deref().unwrap_or_default();
     let pixels: Vec<f32> = match Data::of(layer) {

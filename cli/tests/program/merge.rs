@@ -240,6 +240,9 @@ fn what_cannot_be_written_is_said_and_loses_nothing() {
         assert!(run.stderr.contains(&format!("{name}: File too large")), "{}", run.stderr);
     }
     assert!(bytes(&bench, "a.exr") == b"what was there" && bytes(&bench, "a.part") == b"what was there");
+    let stopped = run("-o b.exr --pixel-bounds 0,64,0,64 --checkpoint b.checkpoint --time-limit 0.000001s");
+    assert!(stopped.stderr.contains("stopped early") && !stopped.stderr.contains("goes on from"), "{}", stopped.stderr);
+    std::fs::remove_file(bench.path("b.exr")).unwrap();
     // The checkpoint does not fit, the compressed image of a smaller frame does.
     let run = run("-o b.exr --pixel-bounds 0,64,0,64 --checkpoint b.checkpoint --checkpoint-interval 1p");
     assert_eq!(run.code, 0, "{}", run.stderr);

@@ -67,6 +67,40 @@ fn outputs_are_checked_before_anything_is_read() {
     assert_eq!(bench.files(), ["file"]);
 }
 
+#[test]
+fn inputs_are_not_written_over() {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", super::SCENE);
+    bench.write_image("a.exr", 4, 4, |_, _| [0.5; 3]);
+    bench.write_image("b.exr", 4, 4, |_, _| [0.5; 3]);
+    let all = || ["scene.pbrt", "a.exr", "b.exr"].map(|name| std::fs::read(bench.path(name)).unwrap());
+    let before = all();
+    let render = ["render", "scene.pbrt", "-o", "c.exr"];
+    bench.fail(&[&render[..], &["--stats", "scene.pbrt"]].concat(), 2, &["scene.pbrt", "is read"]);
+    bench.fail(&[&render[..], &["--log-file", "./scene.pbrt"]].concat(), 2, &["scene.pbrt", "is read"]);
+    for output in ["a.exr", "b.exr"] {
+        bench.fail(&["compare", "a.exr", "b.exr", "-o", output], 2, &[output, "is read"]);
+        bench.fail(
+            &["compare", "a.exr", "a.exr", "--second-reference", "b.exr", "-o", output],
+            2,
+            &[output, "is read"],
+        );
+        bench.fail(&["compare", "a.exr", "b.exr", "--log-file", output], 2, &[output, "is read"]);
+    }
+    std::fs::copy(bench.path("a.exr"), bench.path("a.png")).unwrap();
+    bench.fail(&["preview", "a.png", "-o", "a.png"], 2, &["a.png", "is read"]);
+    assert!(all() == before && !bench.path("c.exr").exists());
+}
+
+#[test]
+fn a_window_without_pixels_is_the_options_fault() {
+    let bench = Bench::new();
+    bench.write("scene.pbrt", super::SCENE);
+    let render = ["render", "scene.pbrt", "-o", "a.exr"];
+    bench.fail(&[&render[..], &["--pixel-bounds=100,200,100,200"]].concat(), 2, &["--pixel-bounds", "48 x 32"]);
+    bench.fail(&[&render[..], &["--crop", "0.001,0.002,0,1"]].concat(), 2, &["--crop", "48 x 32"]);
+}
+
 /// Linux takes any bytes.
 #[test]
 fn paths_that_are_no_text_are_read_and_refused_as_images() {

@@ -13,7 +13,7 @@ use super::reporter::Reporter;
 use crate::args::RenderArguments;
 use crate::exit::Failure;
 use crate::metadata;
-use crate::stats::{self, Filter, Memory, Primitives, Problems, Rays, Seconds, Stats};
+use crate::stats::{self, Filter, Memory, Primitives, Problems, Rays, Seconds, Stats, many};
 
 /// A frame in its file.
 pub struct Written {
@@ -109,11 +109,6 @@ fn missed(arguments: &RenderArguments, stats: &Stats<'_>) -> Vec<String> {
     if stats.goal_reached { Vec::new() } else { missed.collect() }
 }
 
-/// A count with its noun.
-fn many(count: u64, one: &str, more: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { more })
-}
-
 /// Sums up for people.
 pub fn tell(arguments: &RenderArguments, stats: &Stats<'_>, frame: &Frame, reporter: &Reporter<'_>) {
     let log = reporter.log;
@@ -133,12 +128,8 @@ pub fn tell(arguments: &RenderArguments, stats: &Stats<'_>, frame: &Frame, repor
         ));
     }
     missed(arguments, stats).iter().for_each(|missed| log.warning(missed));
-    if stats.problems.rejected_samples > 0 {
-        let share = 100.0 * stats.problems.rejected_samples as f64 / stats.rays.camera.max(1) as f64;
-        log.warning(&format!(
-            "{} ({share:.2e} %) not finite or negative, which counts as black",
-            many(stats.problems.rejected_samples, "sample was", "samples were")
-        ));
+    if let Some(rejected) = stats::rejected(stats.problems.rejected_samples, stats.rays.camera) {
+        log.warning(&rejected);
     }
     if stats.problems.values_beyond_half > 0 {
         let values = many(stats.problems.values_beyond_half, "value was", "values were");

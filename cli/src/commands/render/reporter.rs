@@ -156,7 +156,7 @@ impl Reporter<'_> {
 
     /// What is to be said where samples are missing: how to go on, if anything was kept for that.
     pub fn hint(&self) -> &'static str {
-        if self.checkpoints.wanted() { "; the same command goes on from the checkpoint" } else { "" }
+        if self.checkpoints.kept() { "; the same command goes on from the checkpoint" } else { "" }
     }
 
     /// Why the render ends before its time.
@@ -202,7 +202,8 @@ impl Reporter<'_> {
                 }
                 Failure::Input(summary)
             }
-            RenderError::EmptySampleRange(_)
+            RenderError::EmptyWindow { .. }
+            | RenderError::EmptySampleRange(_)
             | RenderError::TooManySamples(_)
             | RenderError::Slice { .. }
             | RenderError::Filter(_) => Failure::Usage(summary),
