@@ -114,8 +114,8 @@ fn render(
     let stats_file = arguments.channels.stats.as_deref().map(|path| OutputFile::prepare(&named(path))).transpose()?;
     let checkpoint = checkpoint.as_deref().map(OutputFile::prepare).transpose()?;
     apart(&output, checkpoint.as_ref(), stats_file.as_ref())?;
-    let outputs = [Some(&output), checkpoint.as_ref(), stats_file.as_ref()];
-    outputs.into_iter().flatten().try_for_each(|output| output.spare([&*arguments.scene]))?;
+    // Checkpoints look themselves at what they would take the place of.
+    iter::once(&output).chain(&stats_file).try_for_each(|output| output.spare([&*arguments.scene]))?;
     let checkpoints = Checkpoints::new(&arguments.checkpoint, checkpoint, log)?;
 
     let job = job(arguments, filtering);
