@@ -818,7 +818,7 @@ impl<'w, R: Recorder> Begun<'w, R> {
             (found, radiance, exposure) = (glam::Vec3::ZERO, glam::Vec3::ZERO, 0.0);
             recorder = keeper.recorder();
         }
-        let kept = Keep { slot: pixel.index, index, radiance: found, weight: weight * exposure };
+        let kept = Keep { slot: pixel.index, index, radiance: found, weight, share: exposure };
         let prefix = keeper.keep(&recorder, kept) * exposure;
         let film_from_scene = world.sensor.response * exposure;
         let seen = keeper.aside(&recorder).map(|aside| Seen { aside, film_from_scene });

@@ -120,6 +120,28 @@ fn energy_is_that_of_the_same_samples() {
     }
 }
 
+/// Cells of one surface have one albedo, so what remains is what the adaptive filter may be off by without a clamp.
+#[test]
+fn energy_is_that_of_clamped_samples() {
+    let text = room(SIZE, 1.0, 1.0, PLAIN).replace("Film \"rgb\"", "Film \"rgb\" \"float maxcomponentvalue\" 0.2");
+    let scene = SceneFile::new(&text);
+    let seeds = 8;
+    for (name, filtering) in [("talk", Filtering::named("talk").expect("the talk's filter")), ("adaptive", adaptive())]
+    {
+        let ratios: Vec<f64> = (0..seeds)
+            .map(|seed| {
+                let energy = |filtering| scene.values(16, seed, filtering).mean().iter().sum::<f64>();
+                energy(filtering) / energy(Filtering::None) - 1.0
+            })
+            .collect();
+        let off = mean(&ratios);
+        let spread = (ratios.iter().map(|x| (x - off).powi(2)).sum::<f64>() / (seeds - 1) as f64).sqrt();
+        let error = spread / (seeds as f64).sqrt();
+        println!("{name}: energy off by {:.3} % ± {:.3} %", 100.0 * off, 100.0 * error);
+        assert!(off.abs() <= 0.002 + 3.0 * error);
+    }
+}
+
 #[test]
 fn bias_vanishes() {
     let mut scenes = vec![("room", room(SIZE, 1.0, 1.0, PLAIN))];

@@ -11,7 +11,7 @@ use renderer::render::{Job, Prepared, Unobserved, prepare, trace_tile};
 use renderer::sampling::Sampler;
 use tests::render::{own_scene, run};
 use tests::shared;
-use tests::small::{SceneFile, view};
+use tests::small::{PLAIN, SceneFile, room, view};
 
 /// Compares every path's pieces with its radiance.
 #[derive(Default)]
@@ -19,6 +19,8 @@ struct Resum {
     selection: Selection,
     paths: u64,
     recorded: u64,
+    /// Paths of which the sensor takes only a part.
+    clamped: u64,
     /// Largest difference relative to the path's largest channel.
     worst: f32,
     /// That path.
@@ -33,13 +35,15 @@ impl Keeper for Resum {
     }
 
     fn keep(&mut self, cut: &Cut, sample: Keep) -> Rgb {
-        let whole = sample.radiance * sample.weight;
+        let taken = sample.weight * sample.share;
+        let whole = sample.radiance * taken;
         let mut paths = Paths::default();
         let prefix = paths.keep(cut, sample);
-        let pieces = paths.records.iter().fold(prefix * sample.weight, |sum, record| sum + record.unfiltered());
+        let pieces = paths.records.iter().fold(prefix * taken, |sum, record| sum + record.unfiltered());
         let difference = (pieces - whole).abs().max_element() / whole.abs().max_element().max(f32::MIN_POSITIVE);
         self.paths += 1;
         self.recorded += paths.records.len() as u64;
+        self.clamped += u64::from(sample.share < 1.0);
         // NaN is worse than anything.
         if difference > self.worst || difference.is_nan() {
             self.worst = difference;
@@ -91,6 +95,33 @@ fn pieces_sum_to_the_sample() {
         if let Some(scene) = shared::scene(name) {
             check(&scene);
         }
+    }
+}
+
+#[test]
+fn pieces_sum_to_the_clamped_sample_and_the_clamp_is_in_the_light() {
+    let text = room([48, 36], 1.0, 1.0, PLAIN).replace("Film \"rgb\"", "Film \"rgb\" \"float maxcomponentvalue\" 0.2");
+    let scene = SceneFile::new(&text);
+    let prepared = prepare(&Job { scene: scene.path(), ..Job::default() }, &Unobserved).expect("a scene");
+    let queries = Opaque(prepared.world.geometry.scene());
+    let resum = trace(&prepared, &queries, Selection::Primary);
+    println!("{} of {} paths are clamped, worst difference {:e}", resum.clamped, resum.paths, resum.worst);
+    assert!(resum.clamped > resum.paths / 10, "{} of {} paths are clamped", resum.clamped, resum.paths);
+    assert!(resum.worst <= BOUND, "{:e}: {}", resum.worst, resum.example);
+    let mut paths = Paths::default();
+    let world = &prepared.world;
+    let mut film = Film::new(world.sensor.resolution, world.sensor.bounds, AovSet::default(), false);
+    for tile in &mut film.tiles() {
+        trace_tile(world, &queries, tile, &(0..8), &Sampler::new(1), false, &mut paths);
+    }
+    // With a box filter throughput is the albedo of what is seen, clamped or not: only the light is less.
+    let albedos = [[0.7, 0.7, 0.7], [0.6, 0.1, 0.1], [0.1, 0.5, 0.1], [0.6, 0.6, 0.7]].map(Rgb::from_array);
+    for record in paths.records {
+        let throughput = record.diffuse.throughput.get();
+        assert!(
+            albedos.iter().any(|albedo| (throughput - *albedo).abs().max_element() <= 1.0 / f32::from(u16::MAX)),
+            "{throughput}"
+        );
     }
 }
 

@@ -55,8 +55,10 @@ pub struct Keep {
     pub index: u64,
     /// Along the camera ray, scene RGB; black if it was rejected.
     pub radiance: Rgb,
-    /// What its light counts for: weight of the pixel filter, times the share of it that the sensor takes.
+    /// Of the pixel filter.
     pub weight: f32,
+    /// Of its radiance, what the sensor takes: less than 1 only if it clamps.
+    pub share: f32,
 }
 
 /// Nothing is kept.
@@ -116,7 +118,7 @@ impl Keeper for Paths {
         if self.records.capacity() == self.records.len() {
             self.records.reserve_exact(self.most);
         }
-        self.records.extend(cut.record(sample.slot, sample.index, sample.weight));
+        self.records.extend(cut.record(sample.slot, sample.index, sample.weight, sample.share));
         cut.prefix()
     }
 }

@@ -250,8 +250,10 @@ impl Cut {
         self.prefix
     }
 
-    /// The rest of the path, for the filter; `None` if there is none. `weight`: of the sample, of either sign.
-    pub fn record(&self, slot: u32, sample: u64, weight: f32) -> Option<PathRecord> {
+    /// The rest of the path, for the filter; `None` if there is none. `weight`: of the sample, of either sign. `share`: what
+    /// the sensor takes of its light. That is all light which others read, too: were it part of the throughput, a path that
+    /// is too bright would be clamped in its own pixel and whole in those around.
+    pub fn record(&self, slot: u32, sample: u64, weight: f32, share: f32) -> Option<PathRecord> {
         let first = self.first.as_ref()?;
         let mut record = PathRecord { slot, first: first.vertex, ..PathRecord::default() };
         record.set_sample(sample as u8);
@@ -263,12 +265,12 @@ impl Cut {
             transfer = second.beta * second.albedo;
             record.second = second.vertex;
             record.set_sample(sample as u8);
-            record.suffix = PackedRgb::new(suffix);
+            record.suffix = PackedRgb::new(suffix * share);
         }
         let [diffuse, glossy] = first.lobes(rest);
         let lobe = |throughput: Rgb, rest: Rgb, transfer: Rgb| Lobe {
             throughput: PackedRgb::new(throughput * first.beta * weight),
-            rest: PackedRgb::new(rest),
+            rest: PackedRgb::new(rest * share),
             transfer: PackedRgb::new(transfer),
         };
         if first.albedo != Rgb::ZERO {
