@@ -379,7 +379,7 @@ pub(crate) fn radiance(sum: [i128; 3], quantum: &Quantum) -> Vec3 {
     (DVec3::from_array(sum.map(float)) * unit).as_vec3()
 }
 
-/// ⌊x⌋ of a positive number; nearly all are short, for which there are instructions.
+/// A number of either sign, cut towards zero; nearly all are short, for which there are instructions.
 #[inline]
 fn whole(x: f64) -> i128 {
     if x.abs() < 2f64.powi(63) { i128::from(x as i64) } else { x as i128 }

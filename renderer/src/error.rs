@@ -4,8 +4,9 @@
 //! bias, whatever the sampler's stratification. What is in a filtered image R cannot be weighed against its own samples: the
 //! blend has weighed them already, and what they share with it is as large as its error. So the frame is kept as it was with
 //! m of its n samples:
-//! - of the samples since then the halves A′ and B′ are independent of each other and of Rₘ: (Rₘ − A′)(Rₘ − B′) is Rₘ's
-//!   squared error without bias, variance and bias both. It is as noisy as the unfiltered image, so it is used for the frame
+//! - of the samples since then the halves A′ and B′ are nearly independent of each other and of Rₘ (not quite: they are
+//!   stratified against the samples before them), so (Rₘ − A′)(Rₘ − B′) is nearly Rₘ's squared error without bias, variance
+//!   and bias both. It is as noisy as the unfiltered image, so it is used for the frame
 //!   as a whole;
 //! - (R − Rₘ)² is what the error has lost, with little noise, but blind to what R and Rₘ have in common. It tells pixels
 //!   apart, and the frame's error as far as the first is uncertain.

@@ -114,6 +114,7 @@ pub struct Params {
     pub verification_bits: u32,
     /// None: contributions of all frames count alike and averages converge as long as nothing moves. Some(α): an average
     /// is α × that of the frames before + (1 − α) × that of this frame. Default: none.
+    /// Frames that count alike must be given to the same table; the renderer begins each with an empty one unless this is set.
     pub temporal: Option<f32>,
     /// Which keys make room. Default: never any, for averages that converge.
     pub eviction: Eviction,

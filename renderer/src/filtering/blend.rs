@@ -1,9 +1,11 @@
 //! Filtered or not: decided by what the samples say of the filter's error, against the noise of the unfiltered image.
 //!
 //! Even and odd samples make two independent unfiltered images A and B. With F the filtered one and U the mean of A and B,
-//! (F − A)(F − B) estimates the squared error of F without bias, whatever the sampler's stratification, and (A − B)²/4 that
-//! of U. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal, and less if its tails are
-//! heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
+//! (F − A)(F − B) estimates the squared error of F less 2 cov(F, U), for F has the samples of A and B in it too (the last
+//! term of \[Stein81\]), and (A − B)²/4 that of U. With h the share that a pixel's own samples have in F, cov(F, U) is about
+//! h times the variance of U, and the least squared error of the blend is exceeded by cov² over the
+//! mean of (F − U)²: second order in h. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal,
+//! and less if its tails are heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
 //! has wrong. But where light is rare a few pixels may all have missed it, and seem to be without noise: the variance counts
 //! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it all,
 //! spread over all nine; as [`MISSED`] of it where the pixels are darker than the filter says, for then what they miss may
@@ -15,7 +17,7 @@
 //! error s are weighed by [`most_probable`] against what is believed of the window around it, or the lower confidence bound
 //! e − c s is believed if that is more: at first nothing is believed, so only what is certain speaks against the filter.
 //! With b what is believed of the narrowest window the result is F + w (U − F), w = κb / (κb + V). With κ = 1 and the true
-//! b that minimises the squared error of the sum of independent estimates; [`GRAVITY`] says why and where κ is
+//! b that minimises the squared error of the sum, but for that covariance; [`GRAVITY`] says why and where κ is
 //! more. As samples grow V and s vanish, and w goes to 1 wherever F is wrong.
 //!
 //! With one sample a pixel there are no halves; then the neighbouring pixel stands for the other half.
