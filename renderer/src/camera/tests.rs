@@ -165,7 +165,9 @@ proptest! {
         let dy = (at(x, y + 0.1).ray.direction - at(x, y - 0.1).ray.direction) / 0.2;
         let solid_angle = dx.cross(dy).length();
         let cone = at(x, y);
-        prop_assume!(solid_angle > 1e-6 && (x - 32.0).abs() > 0.5 && (y - 24.0).abs() > 0.5);
+        // Not across the folds of the equal-area square: its middle lines, and the lines between their ends.
+        let fold = (x - 32.0).abs() / 32.0 + (y - 24.0).abs() / 24.0 - 1.0;
+        prop_assume!(solid_angle > 1e-6 && (x - 32.0).abs() > 0.5 && (y - 24.0).abs() > 0.5 && fold.abs() > 0.02);
         let ratio = (2.0 * cone.spread).powi(2) / solid_angle;
         prop_assert!((ratio - 1.0).abs() < 5e-2, "{ratio} {kind:?}");
         prop_assert_eq!(cone.radius, 0.0);
