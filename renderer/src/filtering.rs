@@ -132,7 +132,9 @@ impl std::fmt::Display for Surroundings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Anchor { origin, extent } = self.anchor;
         let [x, y, z] = origin.to_array();
-        let (size, unit) = (extent.log2().floor(), self.unit.log2().floor());
+        // By their bits: a logarithm would take the number below a power of two for that power.
+        let exponent = |length: f64| (length.to_bits() >> 52 & 0x7ff) as i32 - 1023;
+        let (size, unit) = (exponent(extent), exponent(self.unit.into()));
         write!(f, "from {x} {y} {z}, of size 2^{size}, in units of 2^{unit}")
     }
 }
@@ -585,6 +587,19 @@ fn block_spp(pixels: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_are_told_apart_by_powers_of_two_and_the_camera() {
+        let words = |x: f64, extent: f64, unit: f32| {
+            let anchor = Anchor { origin: glam::DVec3::new(x, 0.0, 0.0), extent };
+            Surroundings { anchor, unit, response: Mat3::IDENTITY }.to_string()
+        };
+        let one = words(1.0, 1024.0, 1024.0);
+        assert_eq!(one, words(1.0, 2047.0, 2047.0));
+        assert_ne!(one, words(1.0, 1024.0 - 1e-12, 1024.0));
+        assert_ne!(one, words(1.0, 1024.0, 1024.0 - 1e-4));
+        assert_ne!(one, words(1.0 + 1e-15, 1024.0, 1024.0));
+    }
 
     #[test]
     fn an_epoch_is_an_eighth_of_the_samples_unless_told() {

@@ -3,15 +3,16 @@
 //! Even and odd samples make two independent unfiltered images A and B. With F the filtered one and U the mean of A and B,
 //! (F − A)(F − B) estimates the squared error of F less 2 cov(F, U), for F has the samples of A and B in it too (the last
 //! term of \[Stein81\]), and (A − B)²/4 that of U. With h the share that a pixel's own samples have in F, cov(F, U) is about
-//! h times the variance of U, and the least squared error of the blend is exceeded by cov² over the
-//! mean of (F − U)²: second order in h. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal,
-//! and less if its tails are heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
+//! h times the variance of U, and the least squared error of the blend is exceeded by cov² over the mean of (F − U)²: second
+//! order in h. The first has the variance ((A − F)² − (B − F)²)²/4 in the mean if noise is normal, and less if its tails are
+//! heavier. This is sampling noise alone: where it vanishes so do doubts, however few pixels of a neighbourhood the filter
 //! has wrong. But where light is rare a few pixels may all have missed it, and seem to be without noise: the variance counts
-//! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it all,
-//! spread over all nine; as [`MISSED`] of it where the pixels are darker than the filter says, for then what they miss may
-//! be the very light that it has from those around them; where there is none at all, as a ninth of what it counts as there,
-//! from window to window; and [`SCATTER`] of the scatter between pixels is added to it. (From window to window in all cases
-//! it would be too much: in veach-mis, whose dark plates lie beside noisy ones, the gain at one sample fell by two thirds.)
+//! as a ninth of that in the window of nine times as many pixels at least, as if it had been one of the nine that saw it
+//! all, spread over all nine; as [`MISSED`] of it where the pixels are darker than the filter says, for then what they miss
+//! may be the very light that it has from those around them; where there is none at all, as a ninth of what it counts as
+//! there, from window to window; and [`SCATTER`] of the scatter between pixels is added to it. (From window to window in all
+//! cases it would be too much: in veach-mis, whose dark plates lie beside noisy ones, the gain at one sample fell by two
+//! thirds.)
 //!
 //! Windows are nested, each thrice the side of the next. From the widest to the narrowest, a window's mean e and standard
 //! error s are weighed by [`most_probable`] against what is believed of the window around it, or the lower confidence bound
